@@ -1,0 +1,35 @@
+# Flags every target shares. -ffp-contract=off: results must not depend on whether a compiler
+# fuses a multiply and an add on its own (DESIGN: builds that must agree).
+add_compile_options(-Wall -Wextra -Wshadow -Wstrict-prototypes -Wmissing-prototypes
+                    -Wpointer-arith -Wvla -Wundef -fno-math-errno -ffp-contract=off)
+if(EP_WERROR)
+  add_compile_options(-Werror)
+endif()
+if(EP_SANITIZE)
+  add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=undefined
+                      -fno-omit-frame-pointer -g)
+  add_link_options(-fsanitize=address,undefined)
+endif()
+include_directories(${CMAKE_SOURCE_DIR})
+
+# A static library of one folder; headers are included as "folder/name.h".
+function(ep_library name)
+  add_library(${name} STATIC ${ARGN})
+endfunction()
+
+# A cmocka test program: ep_test(test_name SOURCES a.c LIBS ep_mesh ...). It runs in a directory
+# of its own and learns the source tree and the optional data folder from the environment.
+function(ep_test name)
+  cmake_parse_arguments(T "" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
+  add_executable(${name} ${T_SOURCES})
+  target_link_libraries(${name} PRIVATE ${T_LIBS} ${EP_CMOCKA_LIBS} m)
+  target_compile_definitions(${name} PRIVATE EP_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+  set(dir ${CMAKE_BINARY_DIR}/test-work/${name})
+  file(MAKE_DIRECTORY ${dir})
+  add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${dir})
+  if(NOT T_TIMEOUT)
+    set(T_TIMEOUT 300)
+  endif()
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${T_TIMEOUT}
+    ENVIRONMENT "ASAN_OPTIONS=detect_leaks=0;OPENBLAS_NUM_THREADS=1;OMP_NUM_THREADS=1")
+endfunction()
