@@ -1,0 +1,108 @@
+// Maps between shapes: regions, frames, product-space matching, coupled bases, composition, and
+// the record by which a person can judge a map. (Kovnatsky et al. 2013; DESIGN "Maps".)
+#ifndef EP_ALIGN_ALIGN_H
+#define EP_ALIGN_ALIGN_H
+
+#include <stdbool.h>
+
+#include "base/log.h"
+#include "lbspace/lbspace.h"
+
+// A mesh with its LB space and mass matrix; all borrowed.
+typedef struct ep_shape {
+  const ep_mesh *mesh;
+  const ep_lb *lb;
+  const ep_csr *mass;
+} ep_shape;
+
+// Corresponding regions of several shapes: region g of shape s is
+// vertex[start[g * shapes + s] .. start[g * shapes + s + 1]), vertices of the mesh from 0.
+typedef struct ep_regions {
+  int count, shapes;
+  int *start;  // (count * shapes + 1)
+  int *vertex; // (start[count * shapes])
+} ep_regions;
+
+// The authors' .ini: number of regions, then for each one line of 1-based file vertices, ended by
+// ';', for the object and one for each example in order. meshes (shapes) in that order.
+// Errors: EP_ERR_FORMAT with file and line: wrong count, empty region, vertex out of range.
+ep_status ep_regions_read(const char *path, int shapes, const ep_mesh *const *meshes,
+                          ep_regions *out, ep_error *err);
+ep_status ep_regions_parse(const char *name, const char *bytes, int shapes,
+                           const ep_mesh *const *meshes, ep_regions *out, ep_error *err);
+void ep_regions_free(ep_regions *regions);
+
+typedef enum ep_verdict { EP_MAP_GOOD, EP_MAP_DOUBTFUL, EP_MAP_BAD } ep_verdict;
+
+typedef struct ep_region_quality {
+  double residual_before, residual_after; // coupling residual of the region's function, relative
+  double jaccard;                         // of the mapped region with the given one, by volume
+  int best_match;                         // region of the example that fits best
+  bool suspect;                           // best_match differs, or the robust weight gave it up
+} ep_region_quality;
+
+typedef struct ep_map_quality {
+  ep_verdict verdict;
+  char reasons[512];          // why not good; what to give; empty where good
+  double residual_before, residual_after; // coupling, all regions (0 without regions)
+  double orthogonality;       // |A^T A - I| max
+  double determinant;         // of A, +-1
+  double coverage;            // share of the example's volume hit by the map
+  double cycle;               // round trip rms / radius of gyration; -1 where not made
+  double dirichlet;           // of the transferred coordinates over that of the own ones
+  int near_multiple;          // eigenfunctions in near-multiple groups at the cut or inside
+  int reframe_rounds;
+  double frame_angle;         // degrees between authored and final frame
+  int regions;
+  ep_region_quality *region;  // (regions) or NULL
+} ep_map_quality;
+
+// A map "from" -> "to": for every vertex of `from` a vertex of `to`; functional map and coupled
+// basis in the first m functions of each.
+typedef struct ep_map {
+  int n, m;
+  int *p;             // (n) vertex of `to`
+  double *c;          // (m x m) C = Phi_from^T M_from Phi_to[p], row-major
+  double *a;          // (m x m) polar(C^T): coupled basis of `to` is Phi_to A
+  double rotation[9]; // to's frame -> from's frame: x_from ~ scale R (x_to - ct) + cf
+  double scale, center_from[3], center_to[3];
+  ep_map_quality quality;
+} ep_map;
+void ep_map_free(ep_map *map);
+
+typedef struct ep_map_options {
+  int m;                 // functions of the final map
+  bool same_family;      // rest and pose of one family: high gamma, turned poses expected
+  const ep_regions *regions; // NULL: automatic
+  int from_column, to_column; // columns of the two shapes in regions
+} ep_map_options;
+ep_map_options ep_default_map_options(void);
+
+// Product-space matching with reframing (DESIGN, measured recipe). Errors: EP_ERR_ARGUMENT (m
+// larger than the spaces), EP_ERR_MATCH (component counts differ). A bad map is no error here: the
+// verdict says so, the caller decides.
+ep_status ep_map_match(const ep_shape *from, const ep_shape *to, const ep_map_options *options,
+                       ep_log *log, ep_map *out, ep_error *err);
+
+// pose o rest: p[i] = second->p[first->p[i]], matrices multiplied, quality of the worse.
+ep_status ep_map_compose(const ep_map *first, const ep_map *second, ep_map *out, ep_error *err);
+
+// Coupled basis from region functions with the object's basis fixed (B = I): minimise
+//   mu_off * ordered off-diagonal penalty of A^T Lambda A + robust |F^T - G^T A|^2, A^T A = I,
+// on the Stiefel manifold (Riemannian descent, polar retraction). k rows, m columns.
+typedef struct ep_coupling {
+  int k, m;       // example functions used, coupled functions
+  bool ordered;   // |A^T Lambda_k A - Lambda_m|^2 instead of plain off()
+  double mu_data; // weight of the region rows
+  bool robust;    // Cauchy weights on regions
+  int iterations;
+} ep_coupling;
+ep_coupling ep_default_coupling(int m);
+// lambda_to (k) and lambda_from (m), dimensionless; f_from (q x m), f_to (q x k): region functions
+// in each basis. a (k x m): in: start or zero for Procrustes; out. weight (q) robust weights out.
+// *objective final value. Errors: EP_ERR_NUMERIC.
+ep_status ep_couple(const ep_coupling *def, int q, const double *lambda_from,
+                    const double *lambda_to, const double *f_from, const double *f_to, double *a,
+                    double *weight, double *objective, ep_error *err);
+
+#endif

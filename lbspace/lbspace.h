@@ -1,0 +1,53 @@
+// Volumetric Laplace-Beltrami space of a tet mesh: operators, eigenpairs, descriptors, poses.
+// K phi = lambda M phi with linear elements, consistent mass, natural boundary (DESIGN section 3).
+#ifndef EP_LBSPACE_LBSPACE_H
+#define EP_LBSPACE_LBSPACE_H
+
+#include "base/log.h"
+#include "linalg/sparse.h"
+#include "mesh/mesh.h"
+
+typedef struct ep_lb {
+  int n, m;       // vertices; eigenfunctions, the constant one(s) left out
+  double volume;  // of the mesh
+  double *lambda; // (m) ascending [1/length^2]
+  double *phi;    // (m x n) rows are eigenfunctions, M-orthonormal [length^-3/2]
+} ep_lb;
+
+// K_ij = sum_e V_e g_i.g_j  and  M_ij = V_e/20 (1 + delta_ij), on the mesh's vertex pattern.
+ep_status ep_lb_stiffness(const ep_mesh *mesh, ep_csr *k, ep_error *err);
+ep_status ep_lb_mass(const ep_mesh *mesh, ep_csr *m, ep_error *err);
+
+// The first `count` eigenpairs above the constants (one constant per component, left out), signs
+// and rotations within near-multiple eigenvalues made canonical, so that repeats agree.
+// Errors: count >= nv - components (EP_ERR_ARGUMENT), solver (EP_ERR_NUMERIC).
+ep_status ep_lb_eigen(const ep_mesh *mesh, int count, ep_log *log, ep_lb *out, ep_error *err);
+void ep_lb_free(ep_lb *lb);
+
+// d = Phi^T M u: coefficients of a vertex field. u (n x 3), d (m x 3).
+void ep_lb_project(const ep_lb *lb, const ep_csr *mass, const double *u, double *d);
+// u = Phi d. d (m x 3), u (n x 3).
+void ep_lb_reconstruct(const ep_lb *lb, const double *d, double *u);
+
+// Complete a pose: the shape whose low LB coefficients are Phi^T M X + d and which is otherwise as
+// rigid as possible (LB-ARAP, DESIGN "Example poses on the object's mesh").
+typedef struct ep_pose_options {
+  int m;                     // coefficients used, <= lb->m
+  int iterations;            // about 100
+  double tolerance;          // stop when no vertex moves more than this times the diagonal
+  const unsigned char *held; // (n) vertices that stay at rest, or NULL
+} ep_pose_options;
+ep_pose_options ep_default_pose_options(void);
+
+typedef struct ep_pose_report {
+  int iterations, inverted_tets;
+  double worst_volume_ratio; // smallest deformed / rest tet volume
+  double coefficient_error;  // |Phi^T M u - d| / |d| at the end (0 unless vertices are held)
+} ep_pose_report;
+
+// d (m x 3) [length^(1 + 3/2)], u (n x 3) the displacement found.
+ep_status ep_lb_pose(const ep_mesh *mesh, const ep_lb *lb, const double *d,
+                     const ep_pose_options *options, double *u, ep_pose_report *report,
+                     ep_error *err);
+
+#endif

@@ -1,0 +1,130 @@
+// Eigenpose run time: one immutable model, many small states, one step function.
+//
+// No library but libm, no allocation, no input or output, no globals: an engine maps an .epm file,
+// opens the model in place, gives each state a block of memory and calls ep_step. The model is
+// shared by any number of states, which may step in parallel.
+#ifndef EP_REDUCED_EIGENPOSE_H
+#define EP_REDUCED_EIGENPOSE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/status.h"
+#include "reduced/material.h"
+#include "reduced/model_arrays.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef int32_t ep_model_int32; // "int32" of the array list
+typedef double ep_model_double;
+
+typedef struct ep_model_sizes {
+#define X(name) int name;
+  EP_MODEL_SIZES(X)
+#undef X
+} ep_model_sizes;
+
+// All arrays are borrowed from the bytes the model was opened in (or from a baker's memory).
+typedef struct ep_model {
+  ep_model_sizes size;
+  ep_material material; // constitutive law at the cubature elements
+  double rest_scale;    // diagonal of the rest bounding box [length]
+#define X(type, name, d1, d2, d3) const ep_model_##type *name;
+  EP_MODEL_ARRAYS(X)
+#undef X
+} ep_model;
+
+// Open an .epm (DESIGN section 4) in memory: `bytes` 64-byte aligned, kept by the caller as long as
+// the model is used. Every offset, size and dtype is checked, contents (finite, weights >= 0) too.
+//   message (may be NULL; at least 256 chars): what is wrong and where.
+// Errors: EP_ERR_FORMAT (truncated, foreign, future schema), EP_ERR_ARGUMENT (alignment).
+ep_status ep_model_open(const void *bytes, size_t size, ep_model *model, char *message);
+
+// ---- state -----------------------------------------------------------------------------------
+typedef struct ep_state ep_state;
+// Bytes of one state with all scratch memory a step needs; 64-byte aligned block from the caller.
+size_t ep_state_bytes(const ep_model *model);
+// The model must outlive the state. Starts at rest. Errors: EP_ERR_ARGUMENT (too small, unaligned).
+ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_state **out);
+double *ep_state_q(ep_state *state);        // (r) reduced coordinates, may be written
+double *ep_state_velocity(ep_state *state); // (r) may be written
+const double *ep_state_weights(const ep_state *state); // (k) example weights of the last step
+const double *ep_state_target(const ep_state *state);  // (r) target configuration of the last step
+
+// ---- energies --------------------------------------------------------------------------------
+// Elastic energy of the model at q by cubature; f (r) = dW/dq and stiffness k (r x r, symmetric,
+// both triangles) unless NULL. project != 0: element tangents projected to positive semidefinite.
+// Uses the state's scratch, changes nothing else.
+double ep_elastic(ep_state *state, const double *q, double *f, double *k, int project);
+
+// Energy of deforming the examples, weighted by w (k), into configuration q:
+//   sum_i w_i sum_j w_j |det F_ij| psi(F_j(q) F_ij^-1)   (Zhao et al. 2018 eq. 4 and 6; DESIGN
+// "Shape interpolation"), gradient f and Hessian h as in ep_elastic.
+double ep_example_energy(ep_state *state, const double *w, const double *q, double *f, double *h,
+                         int project);
+
+// c = c0 + T q (Zhao et al. 2018, sec. 4.2): q (r), c (3m).
+void ep_descriptor(const ep_model *model, const double *q, double *c);
+
+// Weights: min 1/2 |sum_i w_i e_i - c|^2, sum w = 1, w >= 0 over the rest shape and the examples
+// (Zhao et al. 2018 eq. 5). c (3m); w (k + 1), w[0] belongs to the rest shape. Exact active set.
+ep_status ep_example_weights(ep_state *state, const double *c, double *w);
+
+// ---- target ----------------------------------------------------------------------------------
+// How the target configuration is found: NULL for the built-in Newton, or another solver (NLopt in
+// the offline part). Minimise ep_target_energy from q (r, in: warm start, out: minimum).
+typedef struct ep_target_report {
+  int evaluations, iterations;
+  double relative_gradient; // |K0^-1/2 grad| over that of the start or the scale of the problem
+} ep_target_report;
+typedef ep_status (*ep_target_solver)(void *user, ep_state *state, const double *w, double *q,
+                                      double tolerance, ep_target_report *report);
+// w (k + 1) as from ep_example_weights: rest counts as one more example with F_i = I.
+double ep_target_energy(ep_state *state, const double *w, const double *q, double *f, double *h,
+                        int project);
+ep_status ep_target_newton(void *user, ep_state *state, const double *w, double *q,
+                           double tolerance, ep_target_report *report);
+
+// ---- step ------------------------------------------------------------------------------------
+typedef enum ep_example_force { EP_EXAMPLE_ENERGY, EP_EXAMPLE_LINEAR } ep_example_force;
+
+typedef struct ep_step_def {
+  int cookie;                // set by ep_default_step; a def made otherwise is refused
+  double dt;                 // [s]
+  const double *force;       // (r) generalised external force U^T f, or NULL
+  double damping_mass;       // Rayleigh alpha [1/s]
+  double damping_stiffness;  // Rayleigh beta [s], against K0
+  double strength;           // example strength; 1: as stiff as the material itself; 0: none
+  ep_example_force example_force; // energy (target as undeformed shape) or strength K0 (q_t - q)
+  ep_target_solver target_solver; // NULL: ep_target_newton
+  void *target_user;
+  double target_tolerance;   // relative gradient of the interpolation (1e-6)
+  double tolerance;          // relative residual of the step's Newton (1e-6)
+  int max_iterations;        // Newton iterations (50)
+} ep_step_def;
+ep_step_def ep_default_step(void);
+
+typedef struct ep_step_report {
+  int newton_iterations, line_search_steps, projections; // projections: Cholesky failed, fell back
+  double residual;                                       // relative, at the end
+  ep_target_report target;
+  double elastic_energy, example_energy, kinetic_energy;
+} ep_step_report;
+
+// One implicit Euler step: weights and target from the state's q, then the minimum of the
+// incremental potential with the target frozen. report may be NULL.
+// Errors: EP_ERR_ARGUMENT (def), EP_ERR_NUMERIC (no convergence, NaN): the state is unchanged.
+ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *report);
+
+// Only the interpolation part of a step, for timing and for engines that run it less often.
+ep_status ep_interpolate(ep_state *state, const ep_step_def *def, ep_target_report *report);
+
+// Vertex positions x = X + U q (n x 3).
+void ep_positions(const ep_model *model, const double *q, double *x);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

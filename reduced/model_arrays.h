@@ -1,0 +1,39 @@
+// The arrays of a model, one list: it drives what is in the struct, saved, loaded and checked.
+//   X(type, name, dimension 1, dimension 2, dimension 3)      type: double or int32 (int)
+// Dimensions are members of ep_model_sizes (or literals). Arrays whose product is 0 are absent.
+//
+//   sizes: n vertices, nt tets, r modes, m LB functions of the descriptor (the constant one
+//   included for constrained objects), k examples, s cubature elements, blocks = ceil(s / 8).
+#ifndef EP_REDUCED_MODEL_ARRAYS_H
+#define EP_REDUCED_MODEL_ARRAYS_H
+
+#define EP_MODEL_SIZES(X) X(n) X(nt) X(r) X(m) X(k) X(s) X(blocks)
+
+// clang-format off
+#define EP_MODEL_ARRAYS(X)                                                                        \
+  /* display: positions at rest, tets, modes (r x 3n, mass-orthonormal rows) */                   \
+  X(double, rest_x,        n, 3, 1)                                                               \
+  X(int32,  tets,          nt, 4, 1)                                                              \
+  X(double, u,             r, n, 3)                                                               \
+  /* dynamics: K0 = U^T K(0) U [1/s^2 in mass-orthonormal coordinates] */                          \
+  X(double, k0,            r, r, 1)                                                               \
+  /* descriptors: c(q) = c0 + T q, T (3m x r) row-major, row = 3 * function + axis */              \
+  X(double, c0,            m, 3, 1)                                                               \
+  X(double, t,             m, 3, r)                                                               \
+  /* examples: reduced coordinates and descriptors of each pose */                                \
+  X(double, example_q,     k, r, 1)                                                               \
+  X(double, example_c,     k, m, 3)                                                               \
+  /* cubature: element number, weight (absolute volume), Lame constants */                        \
+  X(int32,  cubature_tet,  s, 1, 1)                                                               \
+  X(double, cubature_w,    s, 1, 1)                                                               \
+  X(double, cubature_lambda, s, 1, 1)                                                             \
+  X(double, cubature_mu,   s, 1, 1)                                                               \
+  /* F_j = I + sum_a q_a G_j,a: lanes of 8 elements, [block][mode][9 entries of F][8 lanes], */    \
+  /* lanes beyond s are zero with weight 0 */                                                     \
+  X(double, cubature_g,    blocks, r, 72)                                                         \
+  /* per example, per cubature element: inverse of F_i (row-major 9) and w |det F_i| */           \
+  X(double, example_finv,  k, s, 9)                                                               \
+  X(double, example_w,     k, s, 1)
+// clang-format on
+
+#endif
