@@ -138,7 +138,9 @@ const char *ep_path_extension(const char *path) {
   return dot && dot != name ? dot + 1 : "";
 }
 
-bool ep_path_exists(const char *path) { return access(path, F_OK) == 0; }
+bool ep_path_exists(const char *path) {
+  return access(path, F_OK) == 0;
+}
 
 ep_digest ep_hash_bytes(const void *bytes, size_t size) {
   const XXH128_hash_t hash = XXH3_128bits(bytes, size);

@@ -1,0 +1,179 @@
+// base/: the first error wins; outputs are whole or absent; random numbers repeat and are uniform;
+// hashes tell contents apart.
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "base/error.h"
+#include "base/files.h"
+#include "base/random.h"
+
+static void first_error_is_kept(void **state) {
+  (void)state;
+  ep_error err = {0};
+  assert_int_equal(ep_fail(&err, EP_ERR_IO, "disk %d", 1), EP_ERR_IO);
+  assert_int_equal(ep_fail(&err, EP_ERR_MESH, "later"), EP_ERR_IO);
+  assert_string_equal(err.text, "disk 1");
+  assert_int_equal(ep_fail_context(&err, "scene %s", "a.yaml"), EP_ERR_IO);
+  assert_string_equal(err.text, "scene a.yaml: disk 1");
+  assert_string_equal(ep_status_name(EP_ERR_NUMERIC), "numeric");
+  assert_string_equal(ep_status_name((ep_status)99), "unknown");
+  assert_int_equal(ep_fail(NULL, EP_ERR_IO, "dropped"), EP_ERR_IO);
+}
+
+static void long_context_is_cut_not_overrun(void **state) {
+  (void)state;
+  ep_error err = {0};
+  char text[2000];
+  memset(text, 'x', sizeof text - 1);
+  text[sizeof text - 1] = '\0';
+  ep_fail(&err, EP_ERR_IO, "%s", text);
+  ep_fail_context(&err, "%s", text);
+  assert_int_equal(strlen(err.text), sizeof err.text - 1);
+}
+
+static void output_replaces_only_on_commit(void **state) {
+  (void)state;
+  ep_error err = {0};
+  assert_int_equal(ep_file_write("out.txt", "old", 3, &err), EP_OK);
+  ep_output out;
+  assert_int_equal(ep_output_open(&out, "out.txt", &err), EP_OK);
+  fputs("new", out.file);
+  char *text;
+  size_t size;
+  assert_int_equal(ep_file_read("out.txt", &text, &size, &err), EP_OK);
+  assert_string_equal(text, "old");
+  free(text);
+  assert_int_equal(ep_output_commit(&out, &err), EP_OK);
+  assert_int_equal(ep_file_read("out.txt", &text, &size, &err), EP_OK);
+  assert_string_equal(text, "new");
+  free(text);
+  assert_int_equal(ep_output_open(&out, "out.txt", &err), EP_OK);
+  ep_output_discard(&out);
+  assert_false(ep_path_exists(out.temporary));
+  assert_true(ep_path_exists("out.txt"));
+}
+
+// A file-size limit stands in for a full disk: the write fails, the old file stays.
+static void full_disk_loses_nothing(void **state) {
+  (void)state;
+  ep_error err = {0};
+  assert_int_equal(ep_file_write("kept.txt", "kept", 4, &err), EP_OK);
+  struct rlimit old, tiny;
+  getrlimit(RLIMIT_FSIZE, &old);
+  tiny = old;
+  tiny.rlim_cur = 1000;
+  signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &tiny);
+  static char big[100000];
+  const ep_status status = ep_file_write("kept.txt", big, sizeof big, &err);
+  setrlimit(RLIMIT_FSIZE, &old);
+  assert_int_equal(status, EP_ERR_IO);
+  assert_non_null(strstr(err.text, "cannot write all of kept.txt"));
+  char *text;
+  size_t size;
+  assert_int_equal(ep_file_read("kept.txt", &text, &size, NULL), EP_OK);
+  assert_string_equal(text, "kept");
+  free(text);
+}
+
+static void missing_files_are_named(void **state) {
+  (void)state;
+  ep_error err = {0};
+  char *text;
+  size_t size;
+  assert_int_equal(ep_file_read("nowhere/file", &text, &size, &err), EP_ERR_IO);
+  assert_non_null(strstr(err.text, "nowhere/file"));
+  memset(&err, 0, sizeof err);
+  assert_int_equal(ep_file_read(".", &text, &size, &err), EP_ERR_IO);
+  assert_non_null(strstr(err.text, "folder"));
+  memset(&err, 0, sizeof err);
+  assert_int_equal(ep_file_write("nowhere/file", "x", 1, &err), EP_ERR_IO);
+}
+
+static void folders_are_made_and_files_in_the_way_named(void **state) {
+  (void)state;
+  ep_error err = {0};
+  assert_int_equal(ep_make_folders("a/b/c", &err), EP_OK);
+  assert_int_equal(ep_make_folders("a/b/c", &err), EP_OK);
+  assert_int_equal(ep_file_write("a/file", "x", 1, &err), EP_OK);
+  assert_int_equal(ep_make_folders("a/file/d", &err), EP_ERR_IO);
+}
+
+static void paths_come_apart_and_together(void **state) {
+  (void)state;
+  char out[EP_PATH_MAX];
+  ep_path_join("dir", "x.veg", out, NULL);
+  assert_string_equal(out, "dir/x.veg");
+  ep_path_join("dir", "/x.veg", out, NULL);
+  assert_string_equal(out, "/x.veg");
+  ep_path_folder("a/b.veg", out, NULL);
+  assert_string_equal(out, "a");
+  ep_path_folder("b.veg", out, NULL);
+  assert_string_equal(out, ".");
+  ep_path_stem("a.b/c.d.veg", out, NULL);
+  assert_string_equal(out, "c.d");
+  assert_string_equal(ep_path_extension("a.b/c"), "");
+  assert_string_equal(ep_path_extension("a.b/c.msh"), "msh");
+}
+
+static void random_numbers_repeat_and_are_uniform(void **state) {
+  (void)state;
+  ep_random a = ep_random_seed(7, 1), b = ep_random_seed(7, 1), c = ep_random_seed(7, 2);
+  int same = 0;
+  for (int i = 0; i < 100; i++) {
+    const uint32_t x = ep_random_u32(&a);
+    assert_int_equal(x, ep_random_u32(&b));
+    same += x == ep_random_u32(&c);
+  }
+  assert_in_range(same, 0, 1);
+  enum { COUNT = 100000 };
+  double mean = 0, variance = 0;
+  int bins[10] = {0};
+  for (int i = 0; i < COUNT; i++) {
+    const double z = ep_random_normal(&a);
+    mean += z / COUNT;
+    variance += z * z / COUNT;
+    bins[ep_random_below(&a, 10)]++;
+  }
+  // Five standard errors: 5 / sqrt(1e5), 5 sqrt(2 / 1e5), 5 sqrt(1e5 * 0.09).
+  assert_true(fabs(mean) < 0.016 && fabs(variance - 1) < 0.023);
+  for (int i = 0; i < 10; i++) assert_in_range(bins[i], COUNT / 10 - 475, COUNT / 10 + 475);
+}
+
+static void hashes_tell_contents_apart(void **state) {
+  (void)state;
+  const ep_digest a = ep_hash_bytes("abc", 3), b = ep_hash_bytes("abd", 3);
+  assert_int_equal(strlen(a.hex), 32);
+  assert_string_not_equal(a.hex, b.hex);
+  ep_digest c;
+  assert_int_equal(ep_file_write("abc", "abc", 3, NULL), EP_OK);
+  assert_int_equal(ep_hash_file("abc", &c, NULL), EP_OK);
+  assert_string_equal(a.hex, c.hex);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(first_error_is_kept),
+      cmocka_unit_test(long_context_is_cut_not_overrun),
+      cmocka_unit_test(output_replaces_only_on_commit),
+      cmocka_unit_test(full_disk_loses_nothing),
+      cmocka_unit_test(missing_files_are_named),
+      cmocka_unit_test(folders_are_made_and_files_in_the_way_named),
+      cmocka_unit_test(paths_come_apart_and_together),
+      cmocka_unit_test(random_numbers_repeat_and_are_uniform),
+      cmocka_unit_test(hashes_tell_contents_apart),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
