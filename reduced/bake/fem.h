@@ -15,10 +15,13 @@ typedef struct ep_fem {
   double *density;     // (nt)
   unsigned char *held; // (3 nv) fixed unknowns
   int nheld;           // fixed vertices
+  int *slot;           // (nt x 16) place of vertex tet[j] among the neighbours of tet[i], ascending
 } ep_fem;
 
-// material: (nmaterials) used through mesh->tet_material, or one for all.
-// fixed (nfixed) vertices of the mesh. Errors: degenerate tets, Poisson's ratio outside [0, 0.5).
+// material: (nmaterials) used through mesh->tet_material, or one for all. Numbers repeated in fixed
+// (nfixed vertices of the mesh) count once.
+// Errors: EP_ERR_MESH names a degenerate tet; EP_ERR_ARGUMENT a density or Young's modulus that is
+// not positive, Poisson's ratio outside [0, 0.5), a fixed vertex that does not exist.
 ep_status ep_fem_create(const ep_mesh *mesh, ep_material model, int nmaterials,
                         const ep_elastic *material, int nfixed, const int *fixed, ep_fem *out,
                         ep_error *err);
