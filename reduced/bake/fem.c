@@ -170,9 +170,19 @@ void ep_fem_stiffness(const ep_fem *fem, const double *u, int project, ep_csr *k
     double f[9], h[81];
     ep_fem_deformation(fem, e, u, f);
     ep_material_tangent(fem->model, fem->lambda[e], fem->mu[e], f, h);
-    if (project) ep_project_psd9(h);
+    if (project) ep_material_project(h);
     ep_fem_scatter_tangent(fem, e, fem->volume[e], h, k);
   }
+}
+
+ep_status ep_fem_rest_stiffness(const ep_fem *fem, ep_csr *k, ep_error *err) {
+  const ep_mesh *mesh = fem->mesh;
+  double *rest = calloc(3 * (size_t)mesh->nv, sizeof *rest);
+  if (!rest) return ep_fail(err, EP_ERR_MEMORY, "%s: no memory for a displacement", mesh->name);
+  ep_status status = ep_csr_from_tets(mesh->nv, mesh->nt, mesh->tet, 3, k, err);
+  if (status == EP_OK) ep_fem_stiffness(fem, rest, 0, k);
+  free(rest);
+  return status;
 }
 
 // rho V / 20 (1 + delta_ij) for linear tets, added to `axes` diagonals of each vertex block.

@@ -32,6 +32,8 @@ void ep_fem_free(ep_fem *fem);
 double ep_fem_energy(const ep_fem *fem, const double *u);
 void ep_fem_force(const ep_fem *fem, const double *u, double *f);
 void ep_fem_stiffness(const ep_fem *fem, const double *u, int project, ep_csr *k);
+// K(0) on a pattern of its own.
+ep_status ep_fem_rest_stiffness(const ep_fem *fem, ep_csr *k, ep_error *err);
 // Consistent mass with density, 3x3-block pattern.
 ep_status ep_fem_mass(const ep_fem *fem, ep_csr *m, ep_error *err);
 // y = M_rho u for fields (nv x 3) without building the 3n matrix: scalar mass m (nv), width 3.

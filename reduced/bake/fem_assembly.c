@@ -1,6 +1,5 @@
 #include "reduced/bake/fem_assembly.h"
 
-#include <math.h>
 #include <string.h>
 
 void ep_fem_displacement_gradient(const ep_fem *fem, int e, const double *u, double d[9]) {
@@ -59,53 +58,4 @@ void ep_fem_scatter_tangent(const ep_fem *fem, int e, double scale, const double
                                           g[3 * v + 1] * t[3 * a + 1][3 * w + c] +
                                           g[3 * v + 2] * t[3 * a + 2][3 * w + c];
     }
-}
-
-// One Jacobi rotation that zeroes a[p][q] (Golub and Van Loan, algorithm 8.4.1); rows of v follow.
-static void rotate(double a[81], double v[81], int p, int q) {
-  double tau = (a[10 * q] - a[10 * p]) / (2 * a[9 * p + q]);
-  double t = (tau >= 0 ? 1.0 : -1.0) / (fabs(tau) + sqrt(1 + tau * tau));
-  double c = 1 / sqrt(1 + t * t), s = t * c;
-  for (int i = 0; i < 9; i++) {
-    double x = a[9 * i + p], y = a[9 * i + q];
-    a[9 * i + p] = c * x - s * y;
-    a[9 * i + q] = s * x + c * y;
-  }
-  for (int i = 0; i < 9; i++) {
-    double x = a[9 * p + i], y = a[9 * q + i];
-    a[9 * p + i] = c * x - s * y;
-    a[9 * q + i] = s * x + c * y;
-    x = v[9 * p + i], y = v[9 * q + i];
-    v[9 * p + i] = c * x - s * y;
-    v[9 * q + i] = s * x + c * y;
-  }
-}
-
-static void jacobi9(double a[81], double v[81]) {
-  enum { SWEEPS = 30 }; // convergence is quadratic: 6 to 8 are needed
-  double norm = 0;
-  memset(v, 0, 81 * sizeof *v);
-  for (int i = 0; i < 9; i++) v[10 * i] = 1;
-  for (int i = 0; i < 81; i++) norm += a[i] * a[i];
-  for (int sweep = 0; sweep < SWEEPS; sweep++) {
-    double off = 0;
-    for (int p = 0; p < 9; p++)
-      for (int q = p + 1; q < 9; q++) off += a[9 * p + q] * a[9 * p + q];
-    if (off <= 1e-30 * norm) return;
-    for (int p = 0; p < 9; p++)
-      for (int q = p + 1; q < 9; q++)
-        if (a[9 * p + q] != 0) rotate(a, v, p, q);
-  }
-}
-
-void ep_project_psd9(double h[81]) {
-  double a[81], v[81];
-  memcpy(a, h, sizeof a);
-  jacobi9(a, v);
-  for (int m = 0; m < 9; m++) {
-    double lambda = a[10 * m];
-    if (lambda >= 0) continue;
-    for (int i = 0; i < 9; i++)
-      for (int j = 0; j < 9; j++) h[9 * i + j] -= lambda * v[9 * m + i] * v[9 * m + j];
-  }
 }

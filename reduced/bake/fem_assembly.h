@@ -15,8 +15,4 @@ void ep_fem_scatter_stress(const ep_fem *fem, int e, double scale, const double 
 // K_vw += scale g_v . H . g_w: the tangent H = dP/dF (9x9) spread over the 16 blocks of tet e.
 void ep_fem_scatter_tangent(const ep_fem *fem, int e, double scale, const double h[81], ep_csr *k);
 
-// Nearest positive semidefinite matrix of a symmetric 9x9 one: negative eigenvalues become zero
-// (cyclic Jacobi). Left bitwise as it is where nothing is negative.
-void ep_project_psd9(double h[81]);
-
 #endif

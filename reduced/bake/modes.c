@@ -1,0 +1,115 @@
+// Linear modes and modal derivatives (Barbic and James 2005, sections 4.1 and 4.2).
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "linalg/petsc.h"
+#include "reduced/bake/basis.h"
+#include "reduced/bake/curvature.h"
+#include "reduced/bake/vectors.h"
+
+// Twice the area of the largest triangle (a, b, v) of fixed vertices, a the first, b farthest
+// from a: zero where all fixed vertices lie on a line.
+static double fixed_spread(const ep_fem *fem) {
+  const double *x = fem->mesh->x, *a = NULL, *b = NULL;
+  double far = 0, area = 0;
+  for (int pass = 0; pass < 2; pass++)
+    for (int v = 0; v < fem->mesh->nv; v++) {
+      const double *y = x + 3 * (size_t)v;
+      if (!fem->held[3 * (size_t)v]) continue;
+      if (!a) a = b = y;
+      double d[3] = {y[0] - a[0], y[1] - a[1], y[2] - a[2]};
+      double l[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+      double c[3] = {d[1] * l[2] - d[2] * l[1], d[2] * l[0] - d[0] * l[2],
+                     d[0] * l[1] - d[1] * l[0]};
+      double square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+      if (pass == 0 && square > far) far = square, b = y;
+      if (pass == 1) area = fmax(area, sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]));
+    }
+  return area;
+}
+
+static ep_status check_request(const ep_fem *fem, int linear, ep_error *err) {
+  const ep_mesh *mesh = fem->mesh;
+  const double diagonal = ep_mesh_diagonal(mesh);
+  if (fem->nheld < 3 || fixed_spread(fem) < 1e-9 * diagonal * diagonal)
+    return ep_fail(err, EP_ERR_UNSUPPORTED,
+                   "%s: %d vertices are fixed; an object must be held by at least three that are "
+                   "not on a line (free motion is not supported yet)",
+                   mesh->name, fem->nheld);
+  const int movable = 3 * (mesh->nv - fem->nheld);
+  if (linear < 1 || linear >= movable)
+    return ep_fail(err, EP_ERR_ARGUMENT,
+                   "%s: %d linear modes wanted; between 1 and %d are possible", mesh->name, linear,
+                   movable - 1);
+  return EP_OK;
+}
+
+static ep_status linear_modes(const ep_fem *fem, const ep_csr *k, ep_log *log, ep_modes *out,
+                              ep_error *err) {
+  ep_csr mass = {0};
+  EP_TRY(ep_fem_mass(fem, &mass, err));
+  // shift 0: with the object held K is positive definite, and the lowest modes are nearest
+  ep_status status =
+      ep_eigenpairs(k, &mass, fem->held, 0, out->linear, out->omega2, out->mode, log, err);
+  ep_csr_free(&mass);
+  const size_t n3 = 3 * (size_t)out->n;
+  for (int i = 0; status == EP_OK && i < out->linear; i++)
+    ep_canonical_sign(n3, out->mode + (size_t)i * n3);
+  return status;
+}
+
+// rows (pairs x 3n) = - columns (3n x pairs)
+static void negated_rows(size_t n3, size_t pairs, const double *columns, double *rows) {
+  for (size_t i = 0; i < n3; i++)
+    for (size_t p = 0; p < pairs; p++) rows[p * n3 + i] = -columns[i * pairs + p];
+}
+
+// K Psi_ij = -(H : psi_j) psi_i for all pairs, one factorisation.
+static ep_status derivatives(const ep_fem *fem, const ep_csr *k, ep_modes *out, ep_error *err) {
+  const size_t n3 = 3 * (size_t)out->n, pairs = (size_t)out->derivatives;
+  ep_factor *factor = NULL;
+  ep_status status;
+  double *f = malloc(n3 * pairs * sizeof *f);
+  if (!f)
+    return ep_fail(err, EP_ERR_MEMORY, "no memory for %d modal derivatives", out->derivatives);
+  EP_TRY_GOTO(status, ep_fem_rest_curvature_forces(fem, out->linear, out->mode, f, err), done);
+  EP_TRY_GOTO(status, ep_factor_create(k, fem->held, 1, &factor, err), done);
+  EP_TRY_GOTO(status, ep_factor_solve(factor, out->derivatives, f, f, err), done);
+  negated_rows(n3, pairs, f, out->mode + (size_t)out->linear * n3);
+done:
+  ep_factor_free(factor);
+  free(f);
+  return status;
+}
+
+ep_status ep_modes_compute(const ep_fem *fem, int linear, ep_log *log, ep_modes *out,
+                           ep_error *err) {
+  const size_t n3 = 3 * (size_t)fem->mesh->nv;
+  ep_csr k = {0};
+  ep_status status;
+  *out = (ep_modes){.n = fem->mesh->nv, .linear = linear};
+  EP_TRY(check_request(fem, linear, err));
+  out->derivatives = linear * (linear + 1) / 2;
+  out->omega2 = malloc((size_t)linear * sizeof *out->omega2);
+  out->mode = malloc((size_t)(linear + out->derivatives) * n3 * sizeof *out->mode);
+  if (!out->omega2 || !out->mode) {
+    status = ep_fail(err, EP_ERR_MEMORY, "no memory for %d modes", linear);
+    goto fail;
+  }
+  EP_TRY_GOTO(status, ep_fem_rest_stiffness(fem, &k, err), fail);
+  EP_TRY_GOTO(status, linear_modes(fem, &k, log, out, err), fail);
+  EP_TRY_GOTO(status, derivatives(fem, &k, out, err), fail);
+  ep_csr_free(&k);
+  return EP_OK;
+fail:
+  ep_csr_free(&k);
+  ep_modes_free(out);
+  return status;
+}
+
+void ep_modes_free(ep_modes *modes) {
+  free(modes->omega2);
+  free(modes->mode);
+  *modes = (ep_modes){0};
+}

@@ -1,0 +1,34 @@
+// Small helpers on rows of length 3n, shared by modes, paths and basis.
+#ifndef EP_BAKE_VECTORS_H
+#define EP_BAKE_VECTORS_H
+
+#include <math.h>
+#include <stddef.h>
+
+static inline double ep_dot(size_t n, const double *x, const double *y) {
+  double sum = 0;
+  for (size_t i = 0; i < n; i++) sum += x[i] * y[i];
+  return sum;
+}
+
+static inline void ep_axpy(size_t n, double a, const double *x, double *y) {
+  for (size_t i = 0; i < n; i++) y[i] += a * x[i];
+}
+
+static inline double ep_largest(size_t n, const double *x) {
+  double largest = 0;
+  for (size_t i = 0; i < n; i++) largest = fmax(largest, fabs(x[i]));
+  return largest;
+}
+
+// Turn x so that its first entry of (nearly) largest size is positive. "Nearly": entries equal by
+// symmetry differ by round-off only, and must not decide the sign between them.
+static inline void ep_canonical_sign(size_t n, double *x) {
+  const double threshold = (1 - 1e-6) * ep_largest(n, x);
+  size_t first = 0;
+  while (first < n && fabs(x[first]) < threshold) first++;
+  if (first == n || x[first] >= 0) return;
+  for (size_t i = 0; i < n; i++) x[i] = -x[i];
+}
+
+#endif
