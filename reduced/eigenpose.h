@@ -42,26 +42,32 @@ typedef struct ep_model {
 // Errors: EP_ERR_FORMAT (truncated, foreign, future schema), EP_ERR_ARGUMENT (alignment).
 ep_status ep_model_open(const void *bytes, size_t size, ep_model *model, char *message);
 
+// The layout of cubature_g. g (s x 9 x r) row-major: dF/dq of each cubature element, row 3 i + j of
+// F; out (s x blocks x 72), blocks = ceil(r / 8), i.e. ep_packed_cubature_size(r, s) doubles.
+size_t ep_packed_cubature_size(int r, int s);
+void ep_pack_cubature(int r, int s, const double *g, double *out);
+
 // ---- state -----------------------------------------------------------------------------------
 typedef struct ep_state ep_state;
 // Bytes of one state with all scratch memory a step needs; 64-byte aligned block from the caller.
 size_t ep_state_bytes(const ep_model *model);
 // The model must outlive the state. Starts at rest. Errors: EP_ERR_ARGUMENT (too small, unaligned).
 ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_state **out);
-double *ep_state_q(ep_state *state);        // (r) reduced coordinates, may be written
-double *ep_state_velocity(ep_state *state); // (r) may be written
+double *ep_state_q(ep_state *state);                   // (r) reduced coordinates, may be written
+double *ep_state_velocity(ep_state *state);            // (r) may be written
 const double *ep_state_weights(const ep_state *state); // (k) example weights of the last step
 const double *ep_state_target(const ep_state *state);  // (r) target configuration of the last step
 
 // ---- energies --------------------------------------------------------------------------------
+// (Not ep_elastic: that is the type of material constants in mesh/mesh.h.)
 // Elastic energy of the model at q by cubature; f (r) = dW/dq and stiffness k (r x r, symmetric,
 // both triangles) unless NULL. project != 0: element tangents projected to positive semidefinite.
 // Uses the state's scratch, changes nothing else.
-double ep_elastic(ep_state *state, const double *q, double *f, double *k, int project);
+double ep_elastic_energy(ep_state *state, const double *q, double *f, double *k, int project);
 
 // Energy of deforming the examples, weighted by w (k), into configuration q:
 //   sum_i w_i sum_j w_j |det F_ij| psi(F_j(q) F_ij^-1)   (Zhao et al. 2018 eq. 4 and 6; DESIGN
-// "Shape interpolation"), gradient f and Hessian h as in ep_elastic.
+// "Shape interpolation"), gradient f and Hessian h as in ep_elastic_energy.
 double ep_example_energy(ep_state *state, const double *w, const double *q, double *f, double *h,
                          int project);
 
@@ -91,18 +97,18 @@ ep_status ep_target_newton(void *user, ep_state *state, const double *w, double 
 typedef enum ep_example_force { EP_EXAMPLE_ENERGY, EP_EXAMPLE_LINEAR } ep_example_force;
 
 typedef struct ep_step_def {
-  int cookie;                // set by ep_default_step; a def made otherwise is refused
-  double dt;                 // [s]
-  const double *force;       // (r) generalised external force U^T f, or NULL
-  double damping_mass;       // Rayleigh alpha [1/s]
-  double damping_stiffness;  // Rayleigh beta [s], against K0
-  double strength;           // example strength; 1: as stiff as the material itself; 0: none
+  int cookie;                     // set by ep_default_step; a def made otherwise is refused
+  double dt;                      // [s]
+  const double *force;            // (r) generalised external force U^T f, or NULL
+  double damping_mass;            // Rayleigh alpha [1/s]
+  double damping_stiffness;       // Rayleigh beta [s], against K0
+  double strength;                // example strength; 1: as stiff as the material itself; 0: none
   ep_example_force example_force; // energy (target as undeformed shape) or strength K0 (q_t - q)
   ep_target_solver target_solver; // NULL: ep_target_newton
   void *target_user;
-  double target_tolerance;   // relative gradient of the interpolation (1e-6)
-  double tolerance;          // relative residual of the step's Newton (1e-6)
-  int max_iterations;        // Newton iterations (50)
+  double target_tolerance; // relative gradient of the interpolation (1e-6)
+  double tolerance;        // relative residual of the step's Newton (1e-6)
+  int max_iterations;      // Newton iterations (50)
 } ep_step_def;
 ep_step_def ep_default_step(void);
 

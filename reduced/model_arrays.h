@@ -3,7 +3,8 @@
 // Dimensions are members of ep_model_sizes (or literals). Arrays whose product is 0 are absent.
 //
 //   sizes: n vertices, nt tets, r modes, m LB functions of the descriptor (the constant one
-//   included for constrained objects), k examples, s cubature elements, blocks = ceil(s / 8).
+//   included for constrained objects), k examples, s cubature elements, blocks = ceil(r / 8):
+//   groups of 8 modes.
 #ifndef EP_REDUCED_MODEL_ARRAYS_H
 #define EP_REDUCED_MODEL_ARRAYS_H
 
@@ -28,9 +29,9 @@
   X(double, cubature_w,    s, 1, 1)                                                               \
   X(double, cubature_lambda, s, 1, 1)                                                             \
   X(double, cubature_mu,   s, 1, 1)                                                               \
-  /* F_j = I + sum_a q_a G_j,a: lanes of 8 elements, [block][mode][9 entries of F][8 lanes], */    \
-  /* lanes beyond s are zero with weight 0 */                                                     \
-  X(double, cubature_g,    blocks, r, 72)                                                         \
+  /* F_j = I + sum_a q_a G_j,a: lanes of 8 modes, [element][block][9 entries of F][8 modes], */    \
+  /* modes beyond r zero. Filled by ep_pack_cubature alone: no one else knows this layout */       \
+  X(double, cubature_g,    s, blocks, 72)                                                         \
   /* per example, per cubature element: inverse of F_i (row-major 9) and w |det F_i| */           \
   X(double, example_finv,  k, s, 9)                                                               \
   X(double, example_w,     k, s, 1)

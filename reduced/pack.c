@@ -1,0 +1,14 @@
+#include <string.h>
+
+#include "reduced/eigenpose.h"
+
+size_t ep_packed_cubature_size(int r, int s) { return (size_t)s * (size_t)((r + 7) / 8) * 72; }
+
+void ep_pack_cubature(int r, int s, const double *g, double *out) {
+  size_t blocks = (size_t)(r + 7) / 8, modes = (size_t)r;
+  memset(out, 0, ep_packed_cubature_size(r, s) * sizeof *out);
+  for (size_t e = 0; e < (size_t)s; e++)
+    for (size_t entry = 0; entry < 9; entry++)
+      for (size_t a = 0; a < modes; a++)
+        out[((e * blocks + a / 8) * 9 + entry) * 8 + a % 8] = g[(9 * e + entry) * modes + a];
+}
