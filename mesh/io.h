@@ -16,7 +16,12 @@ ep_status ep_mesh_read(const char *path, ep_mesh *out, ep_mesh_findings *finding
 // The readers proper work on bytes in memory (fuzzed). `folder` is where *INCLUDE and the .ele's
 // companion are looked up, NULL where there is none.
 typedef enum ep_mesh_format {
-  EP_MESH_VEG, EP_MESH_MSH, EP_MESH_VTK, EP_MESH_MEDIT, EP_MESH_TETGEN, EP_MESH_FORMATS
+  EP_MESH_VEG,
+  EP_MESH_MSH,
+  EP_MESH_VTK,
+  EP_MESH_MEDIT,
+  EP_MESH_TETGEN,
+  EP_MESH_FORMATS
 } ep_mesh_format;
 ep_status ep_mesh_parse(ep_mesh_format format, const char *name, const char *bytes, size_t size,
                         const char *folder, ep_mesh *out, ep_mesh_findings *findings,

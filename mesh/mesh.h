@@ -34,6 +34,8 @@ typedef struct ep_mesh_findings {
   int dropped_cells;        // cells that are not linear tets
   int unused_vertices, duplicate_vertices, degenerate_tets, components;
   int first_duplicate, first_degenerate, first_unused; // -1 where none
+  int repeated_tets;  // tets with the same four vertices as an earlier one: left out
+  int first_repeated; // -1 where none; first_degenerate and this count all tets of the file
 } ep_mesh_findings;
 
 // Takes ownership of nothing: copies x (nv x 3) and tet (nt x 4); turns inverted tets round, drops
@@ -65,6 +67,7 @@ void ep_mesh_centroid(const ep_mesh *mesh, const double *x, double centroid[3]);
 void ep_mesh_vertex_volumes(const ep_mesh *mesh, double *v);
 // Gradients of the four linear shape functions of tet e at rest, into g (4 x 3). Returns volume.
 double ep_tet_gradients(const ep_mesh *mesh, int e, double g[12]);
+// Equal but for tets turned round on reading (a pose may hold inverted ones).
 bool ep_mesh_same_connectivity(const ep_mesh *a, const ep_mesh *b);
 
 // Boundary triangles, outward: *count and *triangle (count x 3, malloc) in mesh order.
