@@ -1,0 +1,224 @@
+#include "reduced/bake/model_build.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// |det F| of an example below this is a flattened element: F^-1 would be mostly round-off.
+static const double FLAT = 1e-8;
+
+// The arrays while they are written; the model itself holds pointers to const.
+typedef struct arrays {
+#define X(type, name, d1, d2, d3) ep_model_##type *name;
+  EP_MODEL_ARRAYS(X)
+#undef X
+} arrays;
+
+typedef struct builder {
+  const ep_model_parts *parts;
+  ep_model_sizes size;
+  arrays a;
+} builder;
+
+static ep_status check_parts(const ep_model_parts *p, ep_error *err) {
+  if (p->basis->n != p->fem->mesh->nv)
+    return ep_fail(err, EP_ERR_ARGUMENT, "the basis is of another mesh (%d vertices, not %d)",
+                   p->basis->n, p->fem->mesh->nv);
+  if (p->s < 1) return ep_fail(err, EP_ERR_ARGUMENT, "a model needs cubature elements");
+  if (p->m < 0 || (p->m > 0 && (!p->lb || !p->lb_mass)))
+    return ep_fail(err, EP_ERR_ARGUMENT, "descriptors need the Laplace-Beltrami space");
+  if (p->m > 0 && (p->lb->m < p->m || p->lb->n != p->basis->n || p->lb_mass->n != p->basis->n))
+    return ep_fail(err, EP_ERR_ARGUMENT,
+                   "%d eigenfunctions wanted, the Laplace-Beltrami space has %d on %d vertices",
+                   p->m, p->lb->m, p->lb->n);
+  if (p->basis->examples > 0 && p->m == 0)
+    return ep_fail(err, EP_ERR_ARGUMENT, "%d examples, but no eigenfunctions to describe them",
+                   p->basis->examples);
+  for (int j = 0; j < p->s; j++) {
+    if (p->tet[j] < 0 || p->tet[j] >= p->fem->mesh->nt)
+      return ep_fail(err, EP_ERR_ARGUMENT, "cubature element %d is tet %d, but there are %d", j,
+                     p->tet[j], p->fem->mesh->nt);
+    if (!(p->weight[j] >= 0) || !isfinite(p->weight[j]))
+      return ep_fail(err, EP_ERR_ARGUMENT, "cubature element %d has the weight %g", j,
+                     p->weight[j]);
+  }
+  return EP_OK;
+}
+
+// cubature_g has a layout of its own (padded lanes), so its size is that of the packing function.
+static ep_status allocate(builder *b, ep_model_memory *out, ep_error *err) {
+  const ep_model_sizes *z = &b->size;
+  int n = z->n, nt = z->nt, r = z->r, m = z->m, k = z->k, s = z->s, blocks = z->blocks;
+  (void)n, (void)nt, (void)r, (void)m, (void)k, (void)s, (void)blocks;
+#define X(type, name, d1, d2, d3)                                                                  \
+  if ((size_t)(d1) * (size_t)(d2) * (size_t)(d3) > 0) {                                            \
+    size_t bytes = (size_t)(d1) * (size_t)(d2) * (size_t)(d3) * sizeof *b->a.name;                 \
+    b->a.name = aligned_alloc(64, (bytes + 63) / 64 * 64);                                         \
+    if (!b->a.name) return ep_fail(err, EP_ERR_MEMORY, "no memory for the model's " #name);        \
+    memset(b->a.name, 0, bytes);                                                                   \
+    out->owned[out->count++] = b->a.name;                                                          \
+  }
+  EP_MODEL_ARRAYS(X)
+#undef X
+  return EP_OK;
+}
+
+static void copy_mesh_and_modes(builder *b) {
+  const ep_mesh *mesh = b->parts->fem->mesh;
+  const ep_basis *basis = b->parts->basis;
+  const size_t r = (size_t)basis->r, n3 = 3 * (size_t)mesh->nv;
+  memcpy(b->a.rest_x, mesh->x, n3 * sizeof(double));
+  for (size_t i = 0; i < 4 * (size_t)mesh->nt; i++) b->a.tets[i] = mesh->tet[i];
+  memcpy(b->a.u, basis->u, r * n3 * sizeof(double));
+  memcpy(b->a.k0, basis->stiffness, r * r * sizeof(double));
+  if (basis->examples > 0)
+    memcpy(b->a.example_q, basis->example_q, (size_t)basis->examples * r * sizeof(double));
+}
+
+// M phi of descriptor function f: the constant one first where the object is held.
+static void weighted_function(const builder *b, int f, double *work, double *out) {
+  const ep_lb *lb = b->parts->lb;
+  const int constant = b->size.m - b->parts->m;
+  for (int i = 0; i < lb->n; i++)
+    work[i] = f < constant ? 1 / sqrt(lb->volume)
+                           : lb->phi[(size_t)(f - constant) * (size_t)lb->n + (size_t)i];
+  ep_csr_multiply(b->parts->lb_mass, 1, work, out);
+}
+
+// row of c (3) = (M phi)^T x
+static void describe(int n, const double *mphi, const double *x, double c[3]) {
+  c[0] = c[1] = c[2] = 0;
+  for (int i = 0; i < n; i++)
+    for (int a = 0; a < 3; a++) c[a] += mphi[i] * x[3 * (size_t)i + (size_t)a];
+}
+
+static ep_status build_descriptors(builder *b, ep_error *err) {
+  const int n = b->size.n, r = b->size.r, m = b->size.m;
+  double *work = malloc(2 * (size_t)n * sizeof *work);
+  if (!work) return ep_fail(err, EP_ERR_MEMORY, "no memory for the model's descriptors");
+  for (int f = 0; f < m; f++) {
+    double *mphi = work + n, c[3];
+    weighted_function(b, f, work, mphi);
+    describe(n, mphi, b->a.rest_x, b->a.c0 + 3 * f);
+    for (int j = 0; j < r; j++) {
+      describe(n, mphi, b->a.u + (size_t)j * 3 * (size_t)n, c);
+      for (int a = 0; a < 3; a++) b->a.t[(size_t)(3 * f + a) * (size_t)r + (size_t)j] = c[a];
+    }
+  }
+  free(work);
+  for (int i = 0; i < b->size.k; i++)
+    for (int row = 0; row < 3 * m; row++) {
+      double sum = b->a.c0[row];
+      for (int j = 0; j < r; j++)
+        sum += b->a.t[(size_t)row * (size_t)r + (size_t)j] * b->a.example_q[i * r + j];
+      b->a.example_c[i * 3 * m + row] = sum;
+    }
+  return EP_OK;
+}
+
+// g (9 x r) of one element: dF_ab / dq_j = sum_v U_j(v)_a g_v,b
+static void element_gradient(const builder *b, int e, double *g) {
+  const ep_fem *fem = b->parts->fem;
+  const int *tet = fem->mesh->tet + 4 * (size_t)e;
+  const double *shape = fem->gradient + 12 * (size_t)e;
+  const size_t r = (size_t)b->size.r, n3 = 3 * (size_t)b->size.n;
+  for (size_t j = 0; j < r; j++)
+    for (int a = 0; a < 3; a++)
+      for (int c = 0; c < 3; c++) {
+        double sum = 0;
+        for (int v = 0; v < 4; v++)
+          sum += b->a.u[j * n3 + 3 * (size_t)tet[v] + (size_t)a] * shape[3 * v + c];
+        g[(size_t)(3 * a + c) * r + j] = sum;
+      }
+}
+
+static ep_status invert3(const double f[9], double inverse[9], double *det) {
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) { // cofactor of (j, i)
+      const int r1 = (j + 1) % 3, r2 = (j + 2) % 3, c1 = (i + 1) % 3, c2 = (i + 2) % 3;
+      inverse[3 * i + j] = f[3 * r1 + c1] * f[3 * r2 + c2] - f[3 * r1 + c2] * f[3 * r2 + c1];
+    }
+  *det = f[0] * inverse[0] + f[1] * inverse[3] + f[2] * inverse[6];
+  if (!(fabs(*det) > FLAT)) return EP_ERR_NUMERIC;
+  for (int i = 0; i < 9; i++) inverse[i] /= *det;
+  return EP_OK;
+}
+
+static ep_status example_at_element(builder *b, int example, int j, const double *g,
+                                    ep_error *err) {
+  const int r = b->size.r, s = b->size.s;
+  const double *q = b->a.example_q + (size_t)example * (size_t)r;
+  const size_t at = (size_t)example * (size_t)s + (size_t)j;
+  double f[9], det;
+  for (int i = 0; i < 9; i++) {
+    f[i] = i % 4 == 0;
+    for (int a = 0; a < r; a++) f[i] += g[(size_t)i * (size_t)r + (size_t)a] * q[a];
+  }
+  if (invert3(f, b->a.example_finv + 9 * at, &det) != EP_OK)
+    return ep_fail(err, EP_ERR_NUMERIC,
+                   "example %d flattens tet %d of the object (volume ratio %g): use fewer "
+                   "eigenfunctions or repair the example",
+                   example + 1, b->parts->tet[j], det);
+  b->a.example_w[at] = b->parts->weight[j] * fabs(det);
+  return EP_OK;
+}
+
+static ep_status fill_cubature(builder *b, double *g, ep_error *err) {
+  const ep_model_parts *p = b->parts;
+  for (int j = 0; j < p->s; j++) {
+    double *gj = g + (size_t)j * 9 * (size_t)b->size.r;
+    element_gradient(b, p->tet[j], gj);
+    b->a.cubature_tet[j] = p->tet[j];
+    b->a.cubature_w[j] = p->weight[j];
+    b->a.cubature_lambda[j] = p->fem->lambda[p->tet[j]];
+    b->a.cubature_mu[j] = p->fem->mu[p->tet[j]];
+    for (int i = 0; i < b->size.k; i++) EP_TRY(example_at_element(b, i, j, gj, err));
+  }
+  ep_pack_cubature(b->size.r, b->size.s, g, b->a.cubature_g);
+  return EP_OK;
+}
+
+static ep_status build_cubature(builder *b, ep_error *err) {
+  double *g = malloc((size_t)b->size.s * 9 * (size_t)b->size.r * sizeof *g);
+  if (!g) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d cubature elements", b->size.s);
+  ep_status status = fill_cubature(b, g, err);
+  free(g);
+  return status;
+}
+
+static ep_model_sizes sizes_of(const ep_model_parts *p) {
+  const int constants = p->m > 0 && p->fem->nheld > 0 ? 1 : 0;
+  return (ep_model_sizes){.n = p->fem->mesh->nv,
+                          .nt = p->fem->mesh->nt,
+                          .r = p->basis->r,
+                          .m = p->m + constants,
+                          .k = p->basis->examples,
+                          .s = p->s,
+                          .blocks = (p->basis->r + 7) / 8};
+}
+
+ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_error *err) {
+  *out = (ep_model_memory){.count = 0};
+  EP_TRY(check_parts(parts, err));
+  builder b = {.parts = parts, .size = sizes_of(parts)};
+  ep_status status;
+  EP_TRY_GOTO(status, allocate(&b, out, err), fail);
+  copy_mesh_and_modes(&b);
+  if (b.size.m > 0) EP_TRY_GOTO(status, build_descriptors(&b, err), fail);
+  EP_TRY_GOTO(status, build_cubature(&b, err), fail);
+  out->model.size = b.size;
+  out->model.material = parts->fem->model;
+  out->model.rest_scale = ep_mesh_diagonal(parts->fem->mesh);
+#define X(type, name, d1, d2, d3) out->model.name = b.a.name;
+  EP_MODEL_ARRAYS(X)
+#undef X
+  return EP_OK;
+fail:
+  ep_model_memory_free(out);
+  return status;
+}
+
+void ep_model_memory_free(ep_model_memory *memory) {
+  for (int i = 0; i < memory->count; i++) free(memory->owned[i]);
+  *memory = (ep_model_memory){.count = 0};
+}

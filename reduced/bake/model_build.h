@@ -1,0 +1,38 @@
+// From the results of a bake to the arrays of a model, in memory.
+#ifndef EP_BAKE_MODEL_BUILD_H
+#define EP_BAKE_MODEL_BUILD_H
+
+#include "base/error.h"
+#include "lbspace/lbspace.h"
+#include "reduced/bake/basis.h"
+#include "reduced/eigenpose.h"
+
+typedef struct ep_model_parts {
+  const ep_fem *fem;
+  const ep_basis *basis;
+  int m;                 // LB eigenfunctions of the descriptor; 0 without examples
+  const ep_lb *lb;       // lb->m >= m; NULL where m == 0
+  const ep_csr *lb_mass; // (n) plain volume mass; NULL where m == 0
+  int s;                 // cubature elements
+  const int *tet;        // (s) element numbers
+  const double *weight;  // (s) absolute volumes, >= 0
+} ep_model_parts;
+
+// A model with memory of its own; nothing of the parts is kept.
+typedef struct ep_model_memory {
+  ep_model model;
+  void *owned[64]; // one block per array
+  int count;
+} ep_model_memory;
+
+// Fills every array of reduced/model_arrays.h. Descriptors (DESIGN "T = L^T U"): T = L^T M3 U with
+// the plain volume mass M, L = Phi kron I3, c0 = L^T M3 X, so that c(q) = c0 + T q. An object with
+// fixed vertices gets the constant function 1/sqrt(V) as function 0 (size.m = m + 1): without
+// it a mean displacement would not be seen. Example i: q_i of the basis, c0 + T q_i, and at each
+// cubature element F_i^-1 and w |det F_i|.
+// Errors: EP_ERR_ARGUMENT (sizes, element numbers, weights), EP_ERR_NUMERIC where an example
+// flattens a cubature element (names both), EP_ERR_MEMORY.
+ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_error *err);
+void ep_model_memory_free(ep_model_memory *memory);
+
+#endif
