@@ -9,10 +9,10 @@
 #include "reduced/bake/basis.h"
 
 typedef struct ep_cubature_options {
-  int elements;          // s at most
-  double tolerance;      // stop at this training error (0: never)
-  int poses;             // training poses; as many again / 2 held out
-  double amplitude;      // largest vertex displacement of random poses over the diagonal (0.2)
+  int elements;     // s at most
+  double tolerance; // stop at this training error (0: never)
+  int poses;        // training poses; as many again / 2 held out
+  double amplitude; // largest vertex displacement of random poses over the diagonal (0.2)
   uint64_t seed;
   int method;            // 0 greedy over all candidates, 1: 100 random candidates a round
   int curve_count;       // held-out error wanted at these sizes too
@@ -22,10 +22,10 @@ ep_cubature_options ep_default_cubature_options(void);
 
 typedef struct ep_cubature {
   int count;
-  int *tet;       // (count) ascending
-  double *weight; // (count) absolute volumes, > 0
+  int *tet;                           // (count) ascending
+  double *weight;                     // (count) absolute volumes, > 0
   double train_error, held_out_error; // relative force error, root mean square over poses
-  double *curve;  // (curve_count) held-out error at each size
+  double *curve;                      // (curve_count) held-out error at each size
 } ep_cubature;
 
 // Training poses: random in the subspace, along the example paths, relative to the examples.

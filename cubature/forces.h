@@ -1,0 +1,43 @@
+// Forces of single elements in reduced coordinates, for training poses.
+#ifndef EP_CUBATURE_FORCES_H
+#define EP_CUBATURE_FORCES_H
+
+#include "reduced/bake/basis.h"
+
+// F_e = I + G_e q;  G_e: (9 x r), rows are the entries of F row-major.
+typedef struct ep_elements {
+  const ep_fem *fem; // borrowed
+  int nt, r;
+  double *g; // (nt x 9 x r) [1/length]
+} ep_elements;
+
+ep_status ep_elements_create(const ep_fem *fem, const ep_basis *basis, ep_elements *out,
+                             ep_error *err);
+void ep_elements_free(ep_elements *elements);
+
+// A training pose: the object at q, and what counts as its undeformed shape.
+typedef struct ep_pose {
+  const double *q;         // (r)
+  const double *reference; // (r) the undeformed shape; NULL: rest
+} ep_pose;
+
+// Elements whose reference shape keeps less than this of its volume have no usable F_i^-1: they
+// give no force in poses relative to it.
+#define EP_FLAT_REFERENCE 0.05
+
+// F_e at q, row-major. Returns det F.
+double ep_element_gradient(const ep_elements *elements, int e, const double *q, double f[9]);
+
+// Generalised force of element e per unit of its rest volume (DESIGN "Cubature training"):
+//   rest:      G^T P(F)
+//   reference: |det F_i| G^T P(F F_i^-1) F_i^-T
+// into out (r). Returns det of F or of F F_i^-1; 1 and a zero force for a flat reference.
+double ep_element_force(const ep_elements *elements, int e, const ep_pose *pose, double *out);
+
+// The determinant ep_element_force would return.
+double ep_element_volume_ratio(const ep_elements *elements, int e, const ep_pose *pose);
+
+// out (r) = G_e^T P for a stress P.
+void ep_element_pull_back(const ep_elements *elements, int e, const double stress[9], double *out);
+
+#endif
