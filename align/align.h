@@ -43,18 +43,18 @@ typedef struct ep_region_quality {
 
 typedef struct ep_map_quality {
   ep_verdict verdict;
-  char reasons[512];          // why not good; what to give; empty where good
+  char reasons[512];                      // why not good; what to give; empty where good
   double residual_before, residual_after; // coupling, all regions (0 without regions)
-  double orthogonality;       // |A^T A - I| max
-  double determinant;         // of A, +-1
-  double coverage;            // share of the example's volume hit by the map
-  double cycle;               // round trip rms / radius of gyration; -1 where not made
-  double dirichlet;           // of the transferred coordinates over that of the own ones
-  int near_multiple;          // eigenfunctions in near-multiple groups at the cut or inside
+  double orthogonality;                   // |A^T A - I| max
+  double determinant;                     // of A, +-1
+  double coverage;                        // share of the example's volume hit by the map
+  double cycle;                           // round trip rms / radius of gyration; -1 where not made
+  double dirichlet;  // of the transferred coordinates over that of the own ones
+  int near_multiple; // eigenfunctions in near-multiple groups at the cut or inside
   int reframe_rounds;
-  double frame_angle;         // degrees between authored and final frame
+  double frame_angle; // degrees between authored and final frame
   int regions;
-  ep_region_quality *region;  // (regions) or NULL
+  ep_region_quality *region; // (regions) or NULL
 } ep_map_quality;
 
 // A map "from" -> "to": for every vertex of `from` a vertex of `to`; functional map and coupled
@@ -71,9 +71,9 @@ typedef struct ep_map {
 void ep_map_free(ep_map *map);
 
 typedef struct ep_map_options {
-  int m;                 // functions of the final map
-  bool same_family;      // rest and pose of one family: high gamma, turned poses expected
-  const ep_regions *regions; // NULL: automatic
+  int m;                      // functions of the final map
+  bool same_family;           // rest and pose of one family: high gamma, turned poses expected
+  const ep_regions *regions;  // NULL: automatic
   int from_column, to_column; // columns of the two shapes in regions
 } ep_map_options;
 ep_map_options ep_default_map_options(void);

@@ -1,0 +1,300 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "align/private.h"
+#include "linalg/dense.h"
+
+// Weights and numbers of functions measured over eleven pairs of shapes (DESIGN "Maps and coupled
+// bases", recipe, step 3). Between poses of one family positions mislead more.
+static const double GAMMA_SHAPES = 4, GAMMA_FAMILY = 2;
+enum { FUNCTIONS_SHAPES = 12, FUNCTIONS_FAMILY = 20 };
+static const double REGION_WEIGHT = 2; // measured useful: 1 to 3
+// Reframing (step 4): at most so many rounds, until the frame turns by less.
+enum { REFRAME_ROUNDS = 4, DROP_ROUNDS = 3 };
+static const double REFRAME_DEGREES = 5;
+// Above this round trip plain nearest neighbours are tried as well (step 5).
+static const double CYCLE_FALLBACK = 0.3;
+// Another start than the authored frame must be better by this factor.
+static const double CYCLE_CLEARLY = 0.8;
+
+ep_map_options ep_default_map_options(void) {
+  return (ep_map_options){.m = 10, .to_column = 1};
+}
+
+void ep_map_free(ep_map *map) {
+  if (!map) return;
+  free(map->p);
+  free(map->c);
+  free(map->a);
+  free(map->quality.region);
+  memset(map, 0, sizeof *map);
+}
+
+// One trial: a map there and back in its final frame.
+typedef struct trial {
+  double r[9], cycle;
+  int rounds;
+  int *p, *back;
+} trial;
+
+typedef struct job {
+  const ep_map_options *options;
+  ep_side from, to;
+  unsigned char *use; // (regions) that take part, NULL without regions
+  ep_log *log;
+} job;
+
+static ep_status make_trial(const job *j, trial *t, ep_error *err) {
+  memset(t, 0, sizeof *t);
+  t->p = malloc((size_t)j->from.n * sizeof *t->p);
+  t->back = malloc((size_t)j->to.n * sizeof *t->back);
+  return t->p && t->back ? EP_OK : ep_fail(err, EP_ERR_MEMORY, "no memory for a map");
+}
+
+static void free_trial(trial *t) {
+  free(t->p);
+  free(t->back);
+  memset(t, 0, sizeof *t);
+}
+
+static void take_trial(trial *into, trial *better) {
+  const trial old = *into;
+  *into = *better;
+  *better = old;
+}
+
+static ep_match_rule rule_of(const job *j) {
+  const bool family = j->options->same_family;
+  int k = family ? FUNCTIONS_FAMILY : FUNCTIONS_SHAPES;
+  if (k < j->options->m) k = j->options->m;
+  return (ep_match_rule){.k = k < j->from.k ? k : j->from.k,
+                         .gamma = family ? GAMMA_FAMILY : GAMMA_SHAPES,
+                         .region_weight = j->use ? REGION_WEIGHT : 0,
+                         .use = j->use};
+}
+
+static double angle_between(const double a[9], const double b[9]) {
+  double back[9], turn[9];
+  ep_frame_transpose(b, back);
+  ep_frame_multiply(a, back, turn);
+  return ep_frame_angle(turn);
+}
+
+// Match, turn the frame to what the map says, match again (step 4); then the way back (step 5).
+static ep_status match_from_frame(const job *j, trial *t, ep_error *err) {
+  const ep_match_rule rule = rule_of(j);
+  EP_TRY(ep_match_levels(&j->from, &j->to, t->r, &rule, t->p, err));
+  for (t->rounds = 0; t->rounds < REFRAME_ROUNDS; t->rounds++) {
+    double turned[9];
+    EP_TRY(ep_frame_from_map(&j->from, &j->to, t->p, turned, err));
+    if (angle_between(turned, t->r) < REFRAME_DEGREES) break;
+    memcpy(t->r, turned, sizeof turned);
+    EP_TRY(ep_match_levels(&j->from, &j->to, t->r, &rule, t->p, err));
+  }
+  double back[9];
+  ep_frame_transpose(t->r, back);
+  EP_TRY(ep_match_levels(&j->to, &j->from, back, &rule, t->back, err));
+  t->cycle = ep_match_cycle(&j->from, t->p, t->back);
+  return EP_OK;
+}
+
+// Turned poses: also start from matching principal axes; kept where the round trip is clearly
+// shorter.
+static ep_status try_axes(const job *j, trial *best, ep_error *err) {
+  trial t;
+  ep_status status = make_trial(j, &t, err);
+  if (status == EP_OK) status = ep_frame_from_axes(&j->from, &j->to, t.r, err);
+  if (status == EP_OK && angle_between(t.r, best->r) >= REFRAME_DEGREES) {
+    status = match_from_frame(j, &t, err);
+    if (status == EP_OK && t.cycle < CYCLE_CLEARLY * best->cycle) take_trial(best, &t);
+  }
+  free_trial(&t);
+  return status;
+}
+
+static ep_status try_plain(const job *j, trial *best, ep_error *err) {
+  trial t;
+  double back[9];
+  ep_status status = make_trial(j, &t, err);
+  if (status == EP_OK) {
+    memcpy(t.r, best->r, sizeof t.r);
+    t.rounds = best->rounds;
+    ep_frame_transpose(t.r, back);
+    status = ep_match_plain(&j->from, &j->to, t.r, t.p, err);
+  }
+  if (status == EP_OK) status = ep_match_plain(&j->to, &j->from, back, t.back, err);
+  if (status == EP_OK) {
+    t.cycle = ep_match_cycle(&j->from, t.p, t.back);
+    if (t.cycle < best->cycle) take_trial(best, &t);
+  }
+  free_trial(&t);
+  return status;
+}
+
+static ep_status match_once(const job *j, trial *t, ep_error *err) {
+  bool found = false;
+  ep_frame_identity(t->r);
+  if (j->use) EP_TRY(ep_frame_from_regions(&j->from, &j->to, j->use, t->r, &found, err));
+  EP_TRY(match_from_frame(j, t, err));
+  if (j->options->same_family && !found) EP_TRY(try_axes(j, t, err));
+  if (t->cycle > CYCLE_FALLBACK) EP_TRY(try_plain(j, t, err));
+  return EP_OK;
+}
+
+// Take regions out that the map contradicts. *dropped: how many; none where it would be half of
+// them or more: then the map is as likely wrong as the file.
+static ep_status drop_suspects(job *j, const trial *t, int *dropped, ep_error *err) {
+  const int count = j->from.regions;
+  double *overlap = malloc((size_t)count * count * sizeof *overlap);
+  unsigned char *suspect = malloc((size_t)count);
+  int *best = malloc((size_t)count * sizeof *best);
+  ep_status status = overlap && suspect && best
+                         ? ep_region_overlap(&j->from, &j->to, t->p, overlap, err)
+                         : ep_fail(err, EP_ERR_MEMORY, "no memory for %d regions", count);
+  int out = 0, fresh = 0;
+  if (status == EP_OK) {
+    ep_region_suspects(count, overlap, suspect, best);
+    for (int g = 0; g < count; g++) {
+      out += suspect[g] || !j->use[g];
+      fresh += suspect[g] && j->use[g];
+    }
+    *dropped = 2 * out < count ? fresh : 0;
+    for (int g = 0; g < count && *dropped; g++)
+      if (suspect[g]) j->use[g] = 0;
+  }
+  free(overlap);
+  free(suspect);
+  free(best);
+  return status;
+}
+
+static ep_status match_and_drop(job *j, trial *t, ep_error *err) {
+  EP_TRY(match_once(j, t, err));
+  for (int round = 0; j->use && round < DROP_ROUNDS; round++) {
+    int dropped = 0;
+    EP_TRY(drop_suspects(j, t, &dropped, err));
+    if (!dropped) break;
+    EP_TRY(match_once(j, t, err));
+  }
+  return EP_OK;
+}
+
+static ep_status functional_map(const job *j, ep_map *out, ep_error *err) {
+  const int m = out->m, k = j->from.k;
+  double *full = malloc((size_t)k * k * sizeof *full);
+  if (!full) return ep_fail(err, EP_ERR_MEMORY, "no memory for a functional map");
+  ep_status status = ep_match_functional(&j->from, &j->to, out->p, full, err);
+  for (int a = 0; a < m && status == EP_OK; a++)
+    for (int b = 0; b < m; b++) {
+      out->c[a * m + b] = full[a * k + b];
+      out->a[b * m + a] = full[a * k + b];
+    }
+  free(full);
+  return status == EP_OK ? ep_polar(m, m, out->a, out->a, err) : status;
+}
+
+static ep_status finish(job *j, trial *t, ep_map *out, ep_error *err) {
+  const size_t square = (size_t)j->options->m * j->options->m;
+  out->n = j->from.n;
+  out->m = j->options->m;
+  out->p = t->p;
+  t->p = NULL;
+  out->c = malloc(square * sizeof *out->c);
+  out->a = malloc(square * sizeof *out->a);
+  if (!out->c || !out->a) return ep_fail(err, EP_ERR_MEMORY, "no memory for a map");
+  EP_TRY(functional_map(j, out, err));
+  memcpy(out->rotation, t->r, sizeof t->r);
+  out->scale = j->from.length / j->to.length;
+  memcpy(out->center_from, j->from.centre, sizeof out->center_from);
+  memcpy(out->center_to, j->to.centre, sizeof out->center_to);
+  out->quality.cycle = t->cycle;
+  out->quality.reframe_rounds = t->rounds;
+  out->quality.frame_angle = ep_frame_angle(t->r);
+  return ep_map_judge(&j->from, &j->to, j->use, out, err);
+}
+
+static ep_status check_shapes(const ep_shape *from, const ep_shape *to, const ep_map_options *o,
+                              ep_error *err) {
+  const char *a = from->mesh->name, *b = to->mesh->name;
+  const int fewer = from->lb->m < to->lb->m ? from->lb->m : to->lb->m;
+  if (o->m < 1 || o->m > fewer)
+    return ep_fail(err, EP_ERR_ARGUMENT,
+                   "a map of %d eigenfunctions between %s and %s, which have %d and %d; ask for at "
+                   "most %d",
+                   o->m, a, b, from->lb->m, to->lb->m, fewer);
+  const ep_regions *r = o->regions;
+  if (r && (o->from_column < 0 || o->from_column >= r->shapes || o->to_column < 0 ||
+            o->to_column >= r->shapes))
+    return ep_fail(err, EP_ERR_ARGUMENT, "columns %d and %d of regions for %d shapes",
+                   o->from_column, o->to_column, r->shapes);
+  const int parts_a = ep_components(from->mesh), parts_b = ep_components(to->mesh);
+  if (parts_a < 0 || parts_b < 0) return ep_fail(err, EP_ERR_MEMORY, "no memory to map %s", a);
+  if (parts_a != parts_b)
+    return ep_fail(err, EP_ERR_MATCH,
+                   "%s has %d connected part(s) and %s has %d: they cannot be mapped; join the "
+                   "parts or remove the extra ones",
+                   a, parts_a, b, parts_b);
+  return EP_OK;
+}
+
+// Functions both sides can offer, as many as the recipe wants.
+static int functions_in_use(const ep_shape *from, const ep_shape *to, const ep_map_options *o) {
+  int k = o->same_family ? FUNCTIONS_FAMILY : FUNCTIONS_SHAPES;
+  if (k < o->m) k = o->m;
+  if (k > from->lb->m) k = from->lb->m;
+  return k > to->lb->m ? to->lb->m : k;
+}
+
+static ep_status make_job(const ep_shape *from, const ep_shape *to, job *j, ep_error *err) {
+  const ep_map_options *o = j->options;
+  const int k = functions_in_use(from, to, o);
+  EP_TRY(ep_side_make(from, k, &j->from, err));
+  EP_TRY(ep_side_make(to, k, &j->to, err));
+  if (!o->regions) return EP_OK;
+  EP_TRY(ep_side_regions(&j->from, o->regions, o->from_column, err));
+  EP_TRY(ep_side_regions(&j->to, o->regions, o->to_column, err));
+  j->use = malloc((size_t)o->regions->count);
+  if (!j->use) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d regions", o->regions->count);
+  memset(j->use, 1, (size_t)o->regions->count);
+  return EP_OK;
+}
+
+static void say(const job *j, const ep_map *map) {
+  const ep_map_quality *q = &map->quality;
+  for (int g = 0; g < q->regions; g++)
+    if (q->region[g].suspect)
+      ep_warn(j->log,
+              "region %d of %s fits region %d of %s better than its own partner (Jaccard %.2f): "
+              "left out of the map; check the order in the region file",
+              g + 1, j->from.shape->mesh->name, q->region[g].best_match + 1,
+              j->to.shape->mesh->name, q->region[g].jaccard);
+  if (q->regions && q->regions <= map->m + 1)
+    ep_notice(j->log, "%d regions alone do not determine %d functions: positions do the rest",
+              q->regions, map->m);
+  if (q->verdict != EP_MAP_GOOD)
+    ep_warn(j->log, "map %s <- %s is %s: %s", j->from.shape->mesh->name, j->to.shape->mesh->name,
+            q->verdict == EP_MAP_BAD ? "bad" : "doubtful", q->reasons);
+}
+
+ep_status ep_map_match(const ep_shape *from, const ep_shape *to, const ep_map_options *options,
+                       ep_log *log, ep_map *out, ep_error *err) {
+  memset(out, 0, sizeof *out);
+  EP_TRY(check_shapes(from, to, options, err));
+  job j = {.options = options, .log = log};
+  trial t = {0};
+  ep_status status = make_job(from, to, &j, err);
+  if (status == EP_OK) status = make_trial(&j, &t, err);
+  if (status == EP_OK) status = match_and_drop(&j, &t, err);
+  if (status == EP_OK) status = finish(&j, &t, out, err);
+  if (status == EP_OK) say(&j, out);
+  if (status != EP_OK) {
+    ep_map_free(out);
+    ep_fail_context(err, "map %s <- %s", from->mesh->name, to->mesh->name);
+  }
+  free_trial(&t);
+  free(j.use);
+  ep_side_free(&j.from);
+  ep_side_free(&j.to);
+  return status;
+}

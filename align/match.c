@@ -1,0 +1,191 @@
+// Product-space matching (DESIGN "Maps and coupled bases"; after ZoomOut, Melzi et al. 2019, and
+// product manifold filters, Vestner et al. 2017): nearest neighbours of [Phi_o | a y | w S_o] to
+// [Phi_e C^T | a x_e | w S_e] while the number of functions kk rises.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "align/private.h"
+#include "linalg/dense.h"
+
+enum { FIRST_FUNCTIONS = 3 };
+
+typedef struct matcher {
+  const ep_side *from, *to;
+  const ep_match_rule *rule;
+  int regions;       // that take part
+  double region_rms; // of those columns of `from`, over its volume
+  double *turned;    // (to->n x 3) to's positions in from's frame
+  double *smooth;    // (from->n x 3) from's positions moved by the kk-mode displacement
+  double *image;     // (from->n x max(k, 3)) values of `to` at p
+  double *query, *target, *lead, *c, *d;
+} matcher;
+
+static void free_matcher(matcher *w) {
+  free(w->turned);
+  free(w->smooth);
+  free(w->image);
+  free(w->query);
+  free(w->target);
+  free(w->lead);
+  free(w->c);
+  free(w->d);
+}
+
+static double root_mean_square(const ep_side *side, const unsigned char *use) {
+  double sum = 0;
+  for (int g = 0; g < side->regions; g++) {
+    if (use && !use[g]) continue;
+    double mean = 0, square = 0;
+    for (int i = 0; i < side->n; i++) {
+      const double v = side->region[(size_t)i * side->regions + g];
+      mean += side->share[i] * v;
+      square += side->share[i] * v * v;
+    }
+    sum += square - mean * mean;
+  }
+  return sqrt(fmax(sum, 1e-12));
+}
+
+static ep_status make_matcher(const ep_side *from, const ep_side *to, const double r[9],
+                              const ep_match_rule *rule, matcher *w, ep_error *err) {
+  memset(w, 0, sizeof *w);
+  w->from = from;
+  w->to = to;
+  w->rule = rule;
+  if (rule->region_weight > 0 && from->regions == to->regions)
+    for (int g = 0; g < from->regions; g++) w->regions += !rule->use || rule->use[g];
+  if (w->regions) w->region_rms = root_mean_square(from, rule->use);
+  const size_t nf = (size_t)from->n, nt = (size_t)to->n, k = (size_t)from->k;
+  const size_t wide = k > 3 ? k : 3, d = (size_t)rule->k + 3 + (size_t)w->regions;
+  w->turned = malloc(3 * nt * sizeof(double));
+  w->smooth = malloc(3 * nf * sizeof(double));
+  w->image = malloc(wide * nf * sizeof(double));
+  w->query = malloc(d * nf * sizeof(double));
+  w->target = malloc(d * nt * sizeof(double));
+  w->lead = malloc((size_t)rule->k * nt * 2 * sizeof(double));
+  w->c = malloc(2 * k * k * sizeof(double));
+  w->d = malloc(3 * k * sizeof(double));
+  if (!w->turned || !w->smooth || !w->image || !w->query || !w->target || !w->lead || !w->c ||
+      !w->d) {
+    free_matcher(w);
+    return ep_fail(err, EP_ERR_MEMORY, "no memory to match %d with %d vertices", from->n, to->n);
+  }
+  ep_frame_apply(to->n, r, to->x, w->turned);
+  memcpy(w->smooth, from->x, 3 * nf * sizeof(double));
+  return EP_OK;
+}
+
+ep_status ep_match_functional(const ep_side *from, const ep_side *to, const int *p, double *c,
+                              ep_error *err) {
+  const int k = from->k;
+  double *image = malloc((size_t)from->n * k * sizeof *image);
+  if (!image) return ep_fail(err, EP_ERR_MEMORY, "no memory for a functional map");
+  for (int i = 0; i < from->n; i++)
+    memcpy(image + (size_t)i * k, to->phi + (size_t)p[i] * k, (size_t)k * sizeof(double));
+  ep_gemm_tn(k, k, from->n, from->mphi, image, c);
+  free(image);
+  return EP_OK;
+}
+
+// y = x + Pi (x_e[p] - x), Pi the projection on the constant and the first kk functions.
+static void smooth_positions(matcher *w, int kk, const int *p) {
+  const ep_side *from = w->from;
+  const int k = from->k;
+  double mean[3] = {0};
+  for (int i = 0; i < from->n; i++)
+    for (int c = 0; c < 3; c++) {
+      const double d = w->turned[3 * (size_t)p[i] + c] - from->x[3 * (size_t)i + c];
+      w->image[3 * (size_t)i + c] = d;
+      mean[c] += from->share[i] * d;
+    }
+  ep_gemm_tn(k, 3, from->n, from->mphi, w->image, w->d);
+  memset(w->d + 3 * kk, 0, 3 * (size_t)(k - kk) * sizeof(double));
+  ep_gemm(from->n, 3, k, from->phi, w->d, w->smooth);
+  for (int i = 0; i < from->n; i++)
+    for (int c = 0; c < 3; c++)
+      w->smooth[3 * (size_t)i + c] += from->x[3 * (size_t)i + c] + mean[c];
+}
+
+// w->lead (to->n x kk) = Phi_to C^T with the leading kk x kk block of C.
+static void functions_of_target(matcher *w, int kk, const int *p) {
+  const int k = w->from->k, n = w->to->n;
+  for (int i = 0; i < w->from->n; i++)
+    memcpy(w->image + (size_t)i * k, w->to->phi + (size_t)p[i] * k, (size_t)k * sizeof(double));
+  ep_gemm_tn(k, k, w->from->n, w->from->mphi, w->image, w->c);
+  double *block = w->c + (size_t)k * k, *first = w->lead + (size_t)n * kk;
+  for (int a = 0; a < kk; a++) memcpy(block + a * kk, w->c + a * k, (size_t)kk * sizeof(double));
+  for (int i = 0; i < n; i++)
+    memcpy(first + (size_t)i * kk, w->to->phi + (size_t)i * k, (size_t)kk * sizeof(double));
+  ep_gemm_nt(n, kk, kk, first, block, w->lead);
+}
+
+static void fill(const matcher *w, const ep_side *side, const double *phi, int stride, int kk,
+                 const double *x, double *out) {
+  const double level = sqrt(kk > 0 ? (double)kk : 1);
+  const double a = w->rule->gamma * level / w->from->radius;
+  const double b = w->regions ? w->rule->region_weight * level / w->region_rms : 0;
+  for (int i = 0; i < side->n; i++) {
+    for (int f = 0; f < kk; f++) *out++ = phi[(size_t)i * stride + f];
+    for (int c = 0; c < 3; c++) *out++ = a * x[3 * (size_t)i + c];
+    if (!w->regions) continue;
+    for (int g = 0; g < side->regions; g++)
+      if (!w->rule->use || w->rule->use[g])
+        *out++ = b * side->region[(size_t)i * side->regions + g];
+  }
+}
+
+static ep_status match_level(matcher *w, int kk, int *p, ep_error *err) {
+  if (kk > 0) {
+    functions_of_target(w, kk, p);
+    smooth_positions(w, kk, p);
+  }
+  fill(w, w->from, w->from->phi, w->from->k, kk, w->smooth, w->query);
+  fill(w, w->to, w->lead, kk, kk, w->turned, w->target);
+  ep_tree *tree;
+  EP_TRY(ep_tree_make(w->to->n, kk + 3 + w->regions, w->target, &tree, err));
+  ep_tree_nearest(tree, w->from->n, w->query, p);
+  ep_tree_free(tree);
+  return EP_OK;
+}
+
+ep_status ep_match_levels(const ep_side *from, const ep_side *to, const double r[9],
+                          const ep_match_rule *rule, int *p, ep_error *err) {
+  if (from->k != to->k || rule->k > from->k)
+    return ep_fail(err, EP_ERR_ARGUMENT, "matching with %d of %d and %d functions", rule->k,
+                   from->k, to->k);
+  matcher w;
+  EP_TRY(make_matcher(from, to, r, rule, &w, err));
+  for (int i = 0; i < from->n; i++) p[i] = -1;
+  ep_status status = match_level(&w, 0, p, err);
+  const int first = rule->k < FIRST_FUNCTIONS ? rule->k : FIRST_FUNCTIONS;
+  for (int kk = first; kk <= rule->k && status == EP_OK; kk++) status = match_level(&w, kk, p, err);
+  free_matcher(&w);
+  return status;
+}
+
+ep_status ep_match_plain(const ep_side *from, const ep_side *to, const double r[9], int *p,
+                         ep_error *err) {
+  double *turned = malloc(3 * (size_t)to->n * sizeof *turned);
+  if (!turned) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d points", to->n);
+  ep_frame_apply(to->n, r, to->x, turned);
+  ep_tree *tree;
+  const ep_status status = ep_tree_make(to->n, 3, turned, &tree, err);
+  free(turned);
+  if (status != EP_OK) return status;
+  for (int i = 0; i < from->n; i++) p[i] = -1;
+  ep_tree_nearest(tree, from->n, from->x, p);
+  ep_tree_free(tree);
+  return EP_OK;
+}
+
+double ep_match_cycle(const ep_side *from, const int *p, const int *back) {
+  double sum = 0;
+  for (int i = 0; i < from->n; i++) {
+    const double *a = from->x + 3 * (size_t)i, *b = from->x + 3 * (size_t)back[p[i]];
+    double d2 = 0;
+    for (int c = 0; c < 3; c++) d2 += (a[c] - b[c]) * (a[c] - b[c]);
+    sum += from->share[i] * d2;
+  }
+  return sqrt(sum) / from->radius;
+}

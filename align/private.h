@@ -1,0 +1,109 @@
+// Shared by the files of align/ and by its tests; not for other folders.
+#ifndef EP_ALIGN_PRIVATE_H
+#define EP_ALIGN_PRIVATE_H
+
+#include "align/align.h"
+
+// ---- neighbours.c: exact nearest neighbours by a tree of tight bounding boxes.
+// The product space has 6 to 80 coordinates, but its points lie near a three-dimensional body, so
+// boxes prune nearly as well as in space: far less work than all distances by dgemm.
+typedef struct ep_tree ep_tree;
+
+// points (n x d) row-major, copied. Memory: about 1.5 times the points. Errors: EP_ERR_ARGUMENT for
+// n < 1 or d < 1, memory.
+ep_status ep_tree_make(int n, int d, const double *points, ep_tree **out, ep_error *err);
+void ep_tree_free(ep_tree *tree);
+// nearest (count): in: a guess for each query (an index, any is right) or -1; out: index of the
+// nearest point, the lowest index among equals. queries (count x d).
+void ep_tree_nearest(const ep_tree *tree, int count, const double *queries, int *nearest);
+
+// ---- side.c: a shape made scale-free: centred at its centroid, lengths over V^(1/3), functions
+// times sqrt(V), so that both sides of a map are comparable.
+typedef struct ep_side {
+  const ep_shape *shape;
+  int n, k;                         // vertices; functions in use
+  double length, centre[3], radius; // V^(1/3), centroid [model units]; rms radius over length
+  double *x;                        // (n x 3)
+  double *phi, *mphi;               // (n x k) vertex by vertex; mphi = M phi / V: mphi^T phi = I
+  double *share;                    // (n) vertex volume over V
+  ep_csr stiffness;
+  int regions;
+  double *indicator; // (n x regions) 0 or 1
+  double *region;    // (n x regions) smoothed
+} ep_side;
+
+ep_status ep_side_make(const ep_shape *shape, int k, ep_side *out, ep_error *err);
+// Indicators of the regions' column and their smoothed form (M + t K) s = M 1_R.
+ep_status ep_side_regions(ep_side *side, const ep_regions *regions, int column, ep_error *err);
+void ep_side_free(ep_side *side);
+// Number of connected components of a mesh, or -1 without memory.
+int ep_components(const ep_mesh *mesh);
+
+// ---- frame.c
+void ep_frame_identity(double r[9]);
+double ep_frame_angle(const double r[9]);                                    // degrees
+void ep_frame_multiply(const double a[9], const double b[9], double out[9]); // may alias
+void ep_frame_transpose(const double a[9], double out[9]);
+// y (n x 3) = R x, row by row.
+void ep_frame_apply(int n, const double r[9], const double *x, double *y);
+// Rotation taking `to` to `from` from the centroids of the regions in use (Kabsch with Cauchy
+// weights: files hold wrong regions). *found = false, R = identity: fewer than four, or not spread.
+ep_status ep_frame_from_regions(const ep_side *from, const ep_side *to, const unsigned char *use,
+                                double r[9], bool *found, ep_error *err);
+// Rotation taking `to` to `from` from a map p, weighted by volume.
+ep_status ep_frame_from_map(const ep_side *from, const ep_side *to, const int *p, double r[9],
+                            ep_error *err);
+// Of the four proper matches of principal axes the one nearest the authored frame.
+ep_status ep_frame_from_axes(const ep_side *from, const ep_side *to, double r[9], ep_error *err);
+
+// ---- match.c: product-space matching in a given frame.
+typedef struct ep_match_rule {
+  int k;                    // functions raised up to
+  double gamma;             // weight of positions
+  double region_weight;     // weight of regions, 0 without
+  const unsigned char *use; // (regions) which take part, NULL: all
+} ep_match_rule;
+
+// p (from->n): the map in frame r. Errors: memory.
+ep_status ep_match_levels(const ep_side *from, const ep_side *to, const double r[9],
+                          const ep_match_rule *rule, int *p, ep_error *err);
+// Nearest neighbours of the positions alone.
+ep_status ep_match_plain(const ep_side *from, const ep_side *to, const double r[9], int *p,
+                         ep_error *err);
+// C (k x k) = Phi_from^T M Phi_to[p], scale-free.
+ep_status ep_match_functional(const ep_side *from, const ep_side *to, const int *p, double *c,
+                              ep_error *err);
+// Round trip from -> to -> from: rms over the rms radius.
+double ep_match_cycle(const ep_side *from, const int *p, const int *back);
+
+// ---- couple.c: the objective and its Euclidean gradient (tests compare with differences).
+typedef struct ep_couple_problem {
+  int k, m, q;
+  bool ordered;
+  double mu_data;
+  double scale; // Cauchy scale of the region residuals; 0: plain least squares
+  const double *lambda_from, *lambda_to, *f_from, *f_to;
+} ep_couple_problem;
+// gradient (k x m) or NULL, weight (q) or NULL; work: ep_couple_work(problem) doubles.
+double ep_couple_objective(const ep_couple_problem *problem, const double *a, double *gradient,
+                           double *weight, double *work);
+size_t ep_couple_work(const ep_couple_problem *problem);
+// Descent on the Stiefel manifold from a (k x m, orthonormal columns). Returns the objective.
+ep_status ep_couple_descend(const ep_couple_problem *problem, int iterations, double *a,
+                            double *objective, ep_error *err);
+
+// ---- quality.c
+// How well region h of `to`, pulled back by p, covers region g of `from`: volume of the common part
+// over that of the union. out (regions x regions), row g.
+ep_status ep_region_overlap(const ep_side *from, const ep_side *to, const int *p, double *out,
+                            ep_error *err);
+// Regions a map contradicts: another region fits clearly better. suspect, best (regions) out.
+void ep_region_suspects(int regions, const double *overlap, unsigned char *suspect, int *best);
+// Fill map->quality (cycle, frame, rounds given by the caller) and the verdict. use (regions) says
+// which regions took part; dropped ones are recorded as suspect.
+ep_status ep_map_judge(const ep_side *from, const ep_side *to, const unsigned char *use,
+                       ep_map *map, ep_error *err);
+// The same without meshes, from what the record holds: verdict and reasons.
+void ep_map_verdict(ep_map *map);
+
+#endif
