@@ -26,6 +26,11 @@ static void skip_spaces(reader *r) {
   while (*r->at == ' ' || *r->at == '\t' || *r->at == '\r') r->at++;
 }
 
+static void skip_separators(reader *r) {
+  while (*r->at == ' ' || *r->at == '\t' || *r->at == '\r' || *r->at == ';' || *r->at == ',')
+    r->at++;
+}
+
 static void skip_blank_lines(reader *r) {
   while (isspace((unsigned char)*r->at)) r->line += *r->at++ == '\n';
 }
@@ -71,6 +76,7 @@ static ep_status take_region(reader *r, int which, const ep_mesh *mesh, int *use
                    "%d shapes)",
                    r->name, r->line, which, r->out->count * r->out->shapes, r->out->count,
                    r->out->shapes);
+  skip_separators(r);
   while (*r->at && *r->at != '\n') {
     const int number = take_number(r);
     if (number < 0) return unexpected(r, "a vertex number or the line's end", err);
@@ -83,11 +89,7 @@ static ep_status take_region(reader *r, int which, const ep_mesh *mesh, int *use
       r->mark[vertex] = which;
       EP_TRY(push(r, used, vertex, err));
     }
-    skip_spaces(r);
-    while (*r->at == ';' || *r->at == ',') {
-      r->at++;
-      skip_spaces(r);
-    }
+    skip_separators(r);
   }
   if (*used == first)
     return ep_fail(err, EP_ERR_FORMAT,
