@@ -13,7 +13,15 @@ static ep_status run_reader(ep_mesh_format format, ep_raw_mesh *raw, ep_scan sca
   switch (format) {
   case EP_MESH_VEG:
     return ep_read_veg(raw, scan, folder, err);
-  default:
+  case EP_MESH_MSH:
+    return ep_read_msh(raw, scan, err);
+  case EP_MESH_VTK:
+    return ep_read_vtk(raw, scan, err);
+  case EP_MESH_MEDIT:
+    return ep_read_medit(raw, scan, err);
+  case EP_MESH_TETGEN:
+    return ep_read_tetgen(raw, scan, folder, err);
+  case EP_MESH_FORMATS:
     break;
   }
   return ep_fail(err, EP_ERR_ARGUMENT, "%s: no such mesh format: %d", raw->name, (int)format);

@@ -13,8 +13,9 @@
 ep_status ep_mesh_read(const char *path, ep_mesh *out, ep_mesh_findings *findings, ep_log *log,
                        ep_error *err);
 
-// The readers proper work on bytes in memory (fuzzed). `folder` is where *INCLUDE and the .ele's
-// companion are looked up, NULL where there is none.
+// The readers proper work on bytes in memory (fuzzed). `folder` is where *INCLUDE and the .node of
+// an .ele (the bytes, named `name`) are looked up; NULL: nothing but the bytes is looked at, and
+// TetGen's are the .node followed by the .ele.
 typedef enum ep_mesh_format {
   EP_MESH_VEG,
   EP_MESH_MSH,

@@ -15,13 +15,14 @@ typedef struct ep_elastic {
 } ep_elastic;
 
 // Vertices no tet uses are left out on reading; file_vertex gives each vertex's place in the file
-// (counted from 0), so that vertex lists made for the file can be translated.
+// (counted from 0), so that vertex lists made for the file can be translated. In Gmsh files, whose
+// numbers may have gaps, the place is the number less 1 (less 0 if there is a vertex 0).
 typedef struct ep_mesh {
   int nv, nt;
   double *x;            // (nv x 3) positions
   int *tet;             // (nt x 4) vertex indices from 0, positive volume
   int *file_vertex;     // (nv) ascending
-  int file_vertices;    // number of vertices in the file
+  int file_vertices;    // number of places in the file: all file_vertex are below it
   int nmaterials;       // 0 where the file names none
   ep_elastic *material; // (nmaterials)
   int *tet_material;    // (nt) index into material; NULL where nmaterials == 0
