@@ -51,10 +51,14 @@ void ep_pack_cubature(int r, int s, const double *g, double *out);
 typedef struct ep_state ep_state;
 // Bytes of one state with all scratch memory a step needs; 64-byte aligned block from the caller.
 size_t ep_state_bytes(const ep_model *model);
-// The model must outlive the state. Starts at rest. Errors: EP_ERR_ARGUMENT (too small, unaligned).
+// The model must outlive the state. Starts at rest. Errors: EP_ERR_ARGUMENT (too small, unaligned),
+// EP_ERR_NUMERIC (K0 is not positive definite).
 ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_state **out);
-double *ep_state_q(ep_state *state);                   // (r) reduced coordinates, may be written
-double *ep_state_velocity(ep_state *state);            // (r) may be written
+const ep_model *ep_state_model(const ep_state *state);
+const double *ep_state_k0_factor(const ep_state *state); // L (r x r, lower), K0 = L L^T
+const char *ep_state_isa(const ep_state *state); // kernels in use: "baseline", "avx2", "avx512"
+double *ep_state_q(ep_state *state);             // (r) reduced coordinates, may be written
+double *ep_state_velocity(ep_state *state);      // (r) may be written
 const double *ep_state_weights(const ep_state *state); // (k) example weights of the last step
 const double *ep_state_target(const ep_state *state);  // (r) target configuration of the last step
 
@@ -90,6 +94,9 @@ typedef ep_status (*ep_target_solver)(void *user, ep_state *state, const double 
 // w (k + 1) as from ep_example_weights: rest counts as one more example with F_i = I.
 double ep_target_energy(ep_state *state, const double *w, const double *q, double *f, double *h,
                         int project);
+// |L^-1 g|, K0 = L L^T, over sqrt(sum_i w_i |L^T (q_w - q_i)|^2), q_w = sum w_i q_i: what the
+// gradients of the single energies are to first order, so a warm start changes nothing in it.
+double ep_target_residual(ep_state *state, const double *w, const double *g);
 ep_status ep_target_newton(void *user, ep_state *state, const double *w, double *q,
                            double tolerance, ep_target_report *report);
 

@@ -2,7 +2,9 @@
 
 #include "reduced/eigenpose.h"
 
-size_t ep_packed_cubature_size(int r, int s) { return (size_t)s * (size_t)((r + 7) / 8) * 72; }
+size_t ep_packed_cubature_size(int r, int s) {
+  return (size_t)s * (size_t)((r + 7) / 8) * 72;
+}
 
 void ep_pack_cubature(int r, int s, const double *g, double *out) {
   size_t blocks = (size_t)(r + 7) / 8, modes = (size_t)r;

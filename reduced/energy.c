@@ -1,0 +1,95 @@
+#include <math.h>
+#include <string.h>
+
+#include "reduced/state.h"
+
+double ep_evaluate(ep_state *state, int terms, const double *q, double *f, double *k, int project) {
+  const ep_model *m = state->model;
+  const int r = m->size.r;
+  memcpy(state->padded_q, q, (size_t)r * sizeof *q); // its tail stays zero
+  ep_kernel_task task = {.r = r,
+                         .s = m->size.s,
+                         .blocks = m->size.blocks,
+                         .material = m->material,
+                         .g = m->cubature_g,
+                         .lambda = m->cubature_lambda,
+                         .mu = m->cubature_mu,
+                         .terms = terms,
+                         .term = state->term,
+                         .q = state->padded_q,
+                         .f = f ? state->padded_f : NULL,
+                         .k = k ? state->padded_k : NULL,
+                         .project = project,
+                         .scratch = state->kernel_scratch};
+  state->kernel(&task);
+  if (f) memcpy(f, state->padded_f, (size_t)r * sizeof *f);
+  for (int i = 0; k && i < r; i++)
+    memcpy(k + (size_t)i * (size_t)r, state->padded_k + (size_t)i * 8 * (size_t)m->size.blocks,
+           (size_t)r * sizeof *k);
+  double energy = 0;
+  for (int i = 0; i < terms; i++) energy += state->term[i].energy;
+  return energy;
+}
+
+double ep_elastic_energy(ep_state *state, const double *q, double *f, double *k, int project) {
+  state->term[0] = (ep_kernel_term){.scale = 1, .weight = state->model->cubature_w};
+  return ep_evaluate(state, 1, q, f, k, project);
+}
+
+// Terms of the examples with weight; w (k). Returns the number of terms after these.
+static int add_examples(ep_state *state, const double *w, int terms) {
+  const ep_model *m = state->model;
+  const size_t s = (size_t)m->size.s;
+  for (int i = 0; i < m->size.k; i++) {
+    if (w[i] == 0) continue;
+    state->term[terms++] = (ep_kernel_term){.scale = w[i],
+                                            .inverse = m->example_finv + (size_t)i * s * 9,
+                                            .weight = m->example_w + (size_t)i * s};
+  }
+  return terms;
+}
+
+double ep_example_energy(ep_state *state, const double *w, const double *q, double *f, double *h,
+                         int project) {
+  return ep_evaluate(state, add_examples(state, w, 0), q, f, h, project);
+}
+
+double ep_target_energy(ep_state *state, const double *w, const double *q, double *f, double *h,
+                        int project) {
+  int terms = 0;
+  if (w[0] != 0)
+    state->term[terms++] = (ep_kernel_term){.scale = w[0], .weight = state->model->cubature_w};
+  return ep_evaluate(state, add_examples(state, w + 1, terms), q, f, h, project);
+}
+
+// F of one element (the scalar form; once per step and element).
+static void element_gradient(const ep_model *m, int e, const double *q, double f[9]) {
+  const double *g = m->cubature_g + (size_t)e * (size_t)m->size.blocks * 72;
+  for (int c = 0; c < 9; c++) {
+    f[c] = c % 4 == 0;
+    for (int a = 0; a < m->size.r; a++) f[c] += g[(a / 8 * 9 + c) * 8 + a % 8] * q[a];
+  }
+}
+
+// A target element below this share of its volume (or inverted) cannot serve as undeformed shape:
+// its inverse would blow up the force. It is left out.
+static const double smallest_target_volume = 0.05;
+
+void ep_freeze_target(ep_state *state) {
+  const ep_model *m = state->model;
+  for (int e = 0; e < m->size.s; e++) {
+    double f[9], *b = state->target_inverse + 9 * e;
+    element_gradient(m, e, state->next_target, f);
+    for (int i = 0; i < 3; i++) {
+      int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
+      for (int j = 0; j < 3; j++) { // transposed cofactors
+        int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+        b[3 * j + i] = f[3 * i1 + j1] * f[3 * i2 + j2] - f[3 * i1 + j2] * f[3 * i2 + j1];
+      }
+    }
+    double det = f[0] * b[0] + f[1] * b[3] + f[2] * b[6];
+    int usable = det > smallest_target_volume;
+    for (int c = 0; c < 9; c++) b[c] = usable ? b[c] / det : c % 4 == 0;
+    state->target_weight[e] = usable ? m->cubature_w[e] * det : 0;
+  }
+}

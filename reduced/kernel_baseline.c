@@ -1,0 +1,3 @@
+// The kernel for one instruction-set level; CMakeLists.txt gives the compiler's flags.
+#define EP_KERNEL ep_kernel_baseline
+#include "reduced/kernel_body.h"

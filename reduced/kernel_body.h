@@ -1,0 +1,212 @@
+// Included once per instruction-set level with EP_KERNEL defined as the function's name.
+//
+// Per 8 elements: F = I + G q (sums over lanes of modes, transposed into lanes of elements), the
+// laws over lanes of elements for each term, summed into one stress and one tangent per element
+// (P F_i^-T and the 9 x 9 tangents: the cost in r does not grow with the number of terms), then
+// f += G^T P and K += G^T (H G) over lanes of modes. Multiply-adds at r = 30, s = 60: H G 155 K,
+// G^T (H G) 346 K on the upper blocks, F and f 17 K each.
+#include <string.h>
+
+#include "reduced/kernel.h"
+#include "reduced/lane_material.h"
+
+// Register tile of K += G^T B: rows x vectors of 8 columns.
+#if defined(__AVX512F__)
+enum { TILE_ROWS = 8, TILE_COLUMNS = 2 };
+#else
+enum { TILE_ROWS = 4, TILE_COLUMNS = 1 };
+#endif
+
+// Gather one number of 8 elements; beyond s the value `beyond`.
+LANE_INLINE lane gather(const double *x, int stride, int first, int s, double beyond) {
+  lane out;
+  for (int i = 0; i < EP_LANES; i++) out[i] = first + i < s ? x[(first + i) * stride] : beyond;
+  return out;
+}
+
+// F of elements first .. first + 7 (lanes of elements).
+static void deformation_gradients(const ep_kernel_task *t, int first, lane f[9]) {
+  const lane *q = (const lane *)t->q;
+  lane sum[9][EP_LANES];
+  for (int e = 0; e < EP_LANES; e++) {
+    lane row[9];
+    for (int c = 0; c < 9; c++) row[c] = lane_all(0);
+    if (first + e < t->s) {
+      const lane *g = (const lane *)t->g + (size_t)(first + e) * (size_t)t->blocks * 9;
+      for (int b = 0; b < t->blocks; b++)
+        for (int c = 0; c < 9; c++) row[c] += g[9 * b + c] * q[b];
+    }
+    for (int c = 0; c < 9; c++) sum[c][e] = row[c];
+  }
+  for (int c = 0; c < 9; c++) f[c] = lane_sum8(sum[c]) + lane_all(c % 4 == 0);
+}
+
+LANE_INLINE void multiply(const lane a[9], const lane b[9], lane c[9]) {
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++)
+      c[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
+}
+
+// p += w p' B^T: the stress with respect to F of psi(F B).
+LANE_INLINE void pull_stress(lane w, const lane p[9], const lane b[9], lane sum[9]) {
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++)
+      sum[3 * i + j] +=
+          w * (p[3 * i] * b[3 * j] + p[3 * i + 1] * b[3 * j + 1] + p[3 * i + 2] * b[3 * j + 2]);
+}
+
+// Each 3 x 3 block (rows of F i, k) of the tangent: sum_ik += w B h_ik B^T; symmetric as a whole.
+static void pull_tangent(lane w, const lane h[81], const lane b[9], lane sum[81]) {
+  for (int i = 0; i < 3; i++) {
+    for (int k = i; k < 3; k++) {
+      lane x[9], y[9];
+      for (int j = 0; j < 9; j++) x[j] = h[9 * (3 * i + j / 3) + 3 * k + j % 3];
+      multiply(b, x, y);
+      for (int c = 0; c < 9; c++) x[c] = lane_all(0);
+      pull_stress(w, y, b, x);
+      for (int j = 0; j < 3; j++) {
+        for (int l = 0; l < 3; l++) {
+          sum[9 * (3 * i + j) + 3 * k + l] += x[3 * j + l];
+          if (k > i) sum[9 * (3 * k + l) + 3 * i + j] += x[3 * j + l];
+        }
+      }
+    }
+  }
+}
+
+// Add one term at F of 8 elements to stress (9) and tangent (81, or NULL); returns its energies.
+static void add_term(const ep_kernel_task *t, const ep_kernel_term *term, int first,
+                     const lane f[9], lane *energy, lane stress[9], lane *tangent) {
+  const lane lambda = gather(t->lambda, 1, first, t->s, 0), mu = gather(t->mu, 1, first, t->s, 0);
+  const lane weight = gather(term->weight, 1, first, t->s, 0);
+  const lane w = weight * lane_all(term->scale);
+  const int want_stress = t->f || t->k;
+  lane b[9], x[9], p[9], h[81];
+  const lane *at = f;
+  if (term->inverse) {
+    for (int c = 0; c < 9; c++) b[c] = gather(term->inverse + c, 9, first, t->s, c % 4 == 0);
+    multiply(f, b, x);
+    at = x;
+  }
+  *energy += weight *
+             lane_material(t->material, lambda, mu, at, want_stress ? p : NULL, tangent ? h : NULL);
+  if (!want_stress) return;
+  if (term->inverse) {
+    pull_stress(w, p, b, stress);
+    if (tangent) pull_tangent(w, h, b, tangent);
+    return;
+  }
+  for (int c = 0; c < 9; c++) stress[c] += w * p[c];
+  for (int c = 0; tangent && c < 81; c++) tangent[c] += w * h[c];
+}
+
+static void project_tangents(lane tangent[81]) {
+  double h[81];
+  for (int e = 0; e < EP_LANES; e++) {
+    for (int c = 0; c < 81; c++) h[c] = tangent[c][e];
+    ep_material_project(h);
+    for (int c = 0; c < 81; c++) tangent[c][e] = h[c];
+  }
+}
+
+// f += G^T P for the elements of one group, three chains of additions.
+static void add_force(const ep_kernel_task *t, int first, const lane stress[9]) {
+  const int count = t->s - first < EP_LANES ? t->s - first : EP_LANES;
+  lane *f = (lane *)t->f;
+  for (int b = 0; b < t->blocks; b++) {
+    lane chain[3] = {f[b], lane_all(0), lane_all(0)};
+    for (int e = 0; e < count; e++) {
+      const lane *g =
+          (const lane *)t->g + ((size_t)(first + e) * (size_t)t->blocks + (size_t)b) * 9;
+      const double *p = (const double *)stress + e;
+      for (int c = 0; c < 9; c++) chain[c % 3] += g[c] * lane_all(p[EP_LANES * c]);
+    }
+    f[b] = (chain[0] + chain[1]) + chain[2];
+  }
+}
+
+// B = H G (element, block, 9 rows) for one group.
+static void tangent_times_modes(const ep_kernel_task *t, int first, const lane *tangent,
+                                lane *out) {
+  const int count = t->s - first < EP_LANES ? t->s - first : EP_LANES;
+  for (int e = 0; e < count; e++) {
+    const double *h = (const double *)tangent + e;
+    const lane *g = (const lane *)t->g + (size_t)(first + e) * (size_t)t->blocks * 9;
+    lane *row = out + (size_t)e * (size_t)t->blocks * 9;
+    for (int b = 0; b < t->blocks; b++, g += 9, row += 9) {
+      for (int i = 0; i < 9; i++) {
+        lane sum = g[0] * lane_all(h[EP_LANES * 9 * i]);
+        for (int j = 1; j < 9; j++) sum += g[j] * lane_all(h[EP_LANES * (9 * i + j)]);
+        row[i] = sum;
+      }
+    }
+  }
+}
+
+// A tile of K: rows row .. row + TILE_ROWS - 1 (of block row / 8), `columns` vectors from block
+// `column` on, over all elements of one group.
+LANE_INLINE void add_tile(const ep_kernel_task *t, const lane *g, const lane *b, int count, int row,
+                          int column, const int columns) {
+  const size_t stride = (size_t)t->blocks * 9;
+  lane sum[TILE_ROWS][TILE_COLUMNS];
+  lane *k = (lane *)t->k + (size_t)row * (size_t)t->blocks + column;
+  for (int i = 0; i < TILE_ROWS; i++)
+    for (int j = 0; j < columns; j++) sum[i][j] = k[(size_t)i * (size_t)t->blocks + (size_t)j];
+  for (int e = 0; e < count; e++) {
+    const double *left = (const double *)(g + (size_t)e * stride + 9 * (row / 8)) + row % 8;
+    const lane *right = b + (size_t)e * stride + 9 * (size_t)column;
+    for (int c = 0; c < 9; c++) {
+      lane x[TILE_COLUMNS];
+      for (int j = 0; j < columns; j++) x[j] = right[9 * j + c];
+      for (int i = 0; i < TILE_ROWS; i++) {
+        const lane y = lane_all(left[8 * c + i]);
+        for (int j = 0; j < columns; j++) sum[i][j] += y * x[j];
+      }
+    }
+  }
+  for (int i = 0; i < TILE_ROWS; i++)
+    for (int j = 0; j < columns; j++) k[(size_t)i * (size_t)t->blocks + (size_t)j] = sum[i][j];
+}
+
+// K += G^T B on the blocks of the upper triangle.
+static void add_stiffness(const ep_kernel_task *t, int first, const lane *b) {
+  const int count = t->s - first < EP_LANES ? t->s - first : EP_LANES;
+  const lane *g = (const lane *)t->g + (size_t)first * (size_t)t->blocks * 9;
+  for (int row = 0; row < 8 * t->blocks; row += TILE_ROWS) {
+    int column = row / 8;
+    for (; column + TILE_COLUMNS <= t->blocks; column += TILE_COLUMNS)
+      add_tile(t, g, b, count, row, column, TILE_COLUMNS);
+    if (TILE_COLUMNS > 1 && column < t->blocks) add_tile(t, g, b, count, row, column, 1);
+  }
+}
+
+static void mirror(int n, double *k) {
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < i; j++) k[n * i + j] = k[n * j + i];
+}
+
+void EP_KERNEL(ep_kernel_task *t) {
+  const size_t width = 8 * (size_t)t->blocks;
+  lane *tangent = t->k ? (lane *)t->scratch : NULL, *product = (lane *)t->scratch + 81;
+  if (t->f) memset(t->f, 0, width * sizeof *t->f);
+  if (t->k) memset(t->k, 0, width * width * sizeof *t->k);
+  for (int i = 0; i < t->terms; i++) t->term[i].energy = 0;
+  for (int first = 0; first < t->s; first += EP_LANES) {
+    lane f[9], stress[9];
+    deformation_gradients(t, first, f);
+    for (int c = 0; c < 9; c++) stress[c] = lane_all(0);
+    for (int c = 0; tangent && c < 81; c++) tangent[c] = lane_all(0);
+    for (int i = 0; i < t->terms; i++) {
+      lane energy = lane_all(0);
+      add_term(t, &t->term[i], first, f, &energy, stress, tangent);
+      t->term[i].energy += lane_sum(energy);
+    }
+    if (t->f) add_force(t, first, stress);
+    if (!t->k) continue;
+    if (t->project) project_tangents(tangent);
+    tangent_times_modes(t, first, tangent, product);
+    add_stiffness(t, first, product);
+  }
+  for (int i = 0; i < t->terms; i++) t->term[i].energy *= t->term[i].scale;
+  if (t->k) mirror((int)width, t->k);
+}

@@ -1,0 +1,83 @@
+#include "reduced/state.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { ALIGNMENT = 64 };
+
+static size_t rounded(size_t bytes) {
+  return (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+}
+
+// Set the pointers into memory (NULL: only count). Returns the bytes used.
+static size_t lay_out(const ep_model *model, char *memory, ep_state *state) {
+  const size_t r = (size_t)model->size.r, m = (size_t)model->size.m, k = (size_t)model->size.k;
+  const size_t s = (size_t)model->size.s, width = 8 * (size_t)model->size.blocks;
+  const size_t examples = k > 0; // without examples their scratch is left out
+  size_t used = rounded(sizeof *state);
+  if (memory) state->term = (ep_kernel_term *)(memory + used);
+  used += rounded((k + 2) * sizeof *state->term);
+#define X(name, count)                                                                             \
+  if (memory) state->name = (double *)(memory + used);                                             \
+  used += rounded((size_t)(count) * sizeof(double));
+  EP_STATE_ARRAYS(X)
+#undef X
+  return used;
+}
+
+size_t ep_state_bytes(const ep_model *model) {
+  return lay_out(model, NULL, NULL);
+}
+
+static void measure_scales(ep_state *state) {
+  const ep_model *m = state->model;
+  const size_t each = (size_t)m->size.blocks * 72;
+  for (int e = 0; e < m->size.s; e++) {
+    const double *g = m->cubature_g + (size_t)e * each;
+    double square = 0;
+    for (size_t i = 0; i < each; i++) square += g[i] * g[i];
+    double norm = sqrt(square);
+    state->strain_scale = fmax(state->strain_scale, norm);
+    double stiffness = m->cubature_w[e] * (m->cubature_lambda[e] + 2 * m->cubature_mu[e]);
+    state->energy_scale += stiffness;
+    state->force_scale += stiffness * norm;
+  }
+}
+
+ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_state **out) {
+  *out = NULL;
+  if (!memory || (uintptr_t)memory % ALIGNMENT || bytes < ep_state_bytes(model))
+    return EP_ERR_ARGUMENT;
+  memset(memory, 0, ep_state_bytes(model));
+  ep_state *state = memory;
+  lay_out(model, memory, state);
+  state->model = model;
+  state->kernel = ep_kernel_select(&state->isa);
+  state->w[0] = 1;
+  measure_scales(state);
+  if (!ep_cholesky(model->size.r, model->k0, state->k0_factor)) return EP_ERR_NUMERIC;
+  *out = state;
+  return EP_OK;
+}
+
+const ep_model *ep_state_model(const ep_state *state) {
+  return state->model;
+}
+const double *ep_state_k0_factor(const ep_state *state) {
+  return state->k0_factor;
+}
+const char *ep_state_isa(const ep_state *state) {
+  return state->isa;
+}
+double *ep_state_q(ep_state *state) {
+  return state->q;
+}
+double *ep_state_velocity(ep_state *state) {
+  return state->v;
+}
+const double *ep_state_weights(const ep_state *state) {
+  return state->w + 1;
+}
+const double *ep_state_target(const ep_state *state) {
+  return state->target;
+}

@@ -1,0 +1,86 @@
+// What a state holds: configuration and every scratch array of a step, in one block of the
+// caller's. Private to the run time.
+#ifndef EP_REDUCED_STATE_H
+#define EP_REDUCED_STATE_H
+
+#include "reduced/eigenpose.h"
+#include "reduced/kernel.h"
+
+// Arrays of a state: X(name, number of doubles). width = 8 ceil(r / 8).
+// clang-format off
+#define EP_STATE_ARRAYS(X)                                                                        \
+  X(q, r)                  /* configuration and velocity */                                        \
+  X(v, r)                                                                                         \
+  X(w, k + 1)              /* weights of rest and examples, target of the last interpolation */   \
+  X(target, r)                                                                                    \
+  X(k0_factor, r * r)      /* lower Cholesky factor of K0 */                                      \
+  X(target_inverse, examples * s * 9)  /* the target as undeformed shape: F_t^-1, w |det F_t| */   \
+  X(target_weight, examples * s)                                                                  \
+  X(c, 3 * m)              /* descriptor */                                                       \
+  X(gram, examples * (k + 1) * (k + 1))   /* weights: Gram matrix, factor, small vectors */       \
+  X(corral, examples * (k + 1) * (k + 1))                                                         \
+  X(small, examples * 3 * (k + 1))                                                                \
+  X(padded_q, width)       /* what the kernels read and write */                                  \
+  X(padded_f, width)                                                                              \
+  X(padded_k, width * width)                                                                      \
+  X(kernel_scratch, ep_kernel_scratch((int)(width / 8)))                                          \
+  X(x, r)                  /* Newton: point, gradient, direction, trial, Hessian, its factor */   \
+  X(g, r)                                                                                         \
+  X(direction, r)                                                                                 \
+  X(trial, r)                                                                                     \
+  X(trial_g, r)                                                                                   \
+  X(h, r * r)                                                                                     \
+  X(factor, r * r)                                                                                \
+  X(aside, r)              /* step: free flight */              \
+  X(next_w, k + 1)         /* interpolation under way: kept only when the step succeeds */        \
+  X(next_target, r)                                                                               \
+  X(work, r)
+// clang-format on
+
+struct ep_state {
+  const ep_model *model;
+  ep_kernel kernel;
+  const char *isa;
+  ep_kernel_term *term; // (k + 2) terms of one evaluation
+  double energy_scale;  // sum_j w_j (lambda + 2 mu): energy at unit strain
+  double force_scale;   // sum_j w_j (lambda + 2 mu) |G_j|: generalised force at unit strain
+  double strain_scale;  // max_j |G_j|_F: strain by a unit q
+  int has_target;       // a target was found before
+#define X(name, count) double *name;
+  EP_STATE_ARRAYS(X)
+#undef X
+};
+
+// Evaluate the first `terms` of state->term at q: sum of the energies (each in its term), f (r) and
+// k (r x r) unless NULL.
+double ep_evaluate(ep_state *state, int terms, const double *q, double *f, double *k, int project);
+
+// Weights and target of the state's q into next_w and next_target, and the target as undeformed
+// shape of an energy into target_inverse and target_weight (without elements it crushes).
+// ep_commit_target makes them those of the state. Needs k > 0.
+ep_status ep_find_target(ep_state *state, const ep_step_def *def, ep_target_report *report);
+void ep_freeze_target(ep_state *state);
+void ep_commit_target(ep_state *state);
+
+// ---- small dense algebra (reduced/newton.c), row-major n x n -----------------------------------
+// Lower Cholesky factor of a into l (l may be a). 0 where a is not positive definite.
+int ep_cholesky(int n, const double *a, double *l);
+void ep_solve_lower(int n, const double *l, double *x); // x := L^-1 x
+void ep_solve_lower_transposed(int n, const double *l, double *x);
+double ep_dot(int n, const double *a, const double *b);
+
+// ---- safeguarded Newton (reduced/newton.c) -----------------------------------------------------
+typedef struct ep_newton {
+  // Energy at x; gradient g and Hessian h unless NULL; project: positive semidefinite.
+  double (*energy)(void *user, const double *x, double *g, double *h, int project);
+  double (*residual)(void *user, const double *x, const double *g); // relative
+  void *user;
+  double tolerance;
+  int max_iterations;
+  int iterations, evaluations, line_search_steps, projections; // out
+  double residual_now, energy_now;                             // out
+} ep_newton;
+// Minimise from state->x to state->x. EP_ERR_NUMERIC: no convergence, or not finite.
+ep_status ep_newton_minimise(ep_state *state, ep_newton *newton);
+
+#endif

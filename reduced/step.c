@@ -1,0 +1,163 @@
+// Implicit Euler as the minimum of the incremental potential (DESIGN "Time step"), in
+// mass-orthonormal coordinates (U^T M U = I):
+//   Phi(x) = |x - q - h v|^2 / (2 h^2) + (x - q)^T D (x - q) / (2 h) + W(x) + beta W_t(x) - f . x
+// with D = alpha I + beta' K0 and the target's energy W_t frozen within the step.
+#include <math.h>
+#include <string.h>
+
+#include "reduced/state.h"
+
+enum { COOKIE = 0x45504f31 }; // "EPO1"
+
+ep_step_def ep_default_step(void) {
+  return (ep_step_def){.cookie = COOKIE,
+                       .dt = 1.0 / 60,
+                       .strength = 1,
+                       .target_tolerance = 1e-6,
+                       .tolerance = 1e-6,
+                       .max_iterations = 50};
+}
+
+static int valid(const ep_step_def *d) {
+  return d->cookie == COOKIE && d->dt > 0 && isfinite(d->dt) && d->damping_mass >= 0 &&
+         isfinite(d->damping_mass) && d->damping_stiffness >= 0 && isfinite(d->damping_stiffness) &&
+         d->strength >= 0 && isfinite(d->strength) && d->tolerance > 0 && d->target_tolerance > 0 &&
+         d->max_iterations > 0 &&
+         (d->example_force == EP_EXAMPLE_ENERGY || d->example_force == EP_EXAMPLE_LINEAR);
+}
+
+typedef struct step {
+  ep_state *state;
+  const ep_step_def *def;
+  int examples;            // an example force acts
+  double internal, linear; // last evaluation: |force| inside, energy of the linear example force
+} step;
+
+// y = scale * K0 (x - origin) added to g; returns (x - origin)^T K0 (x - origin).
+static double add_k0(const step *s, double scale, const double *x, const double *origin,
+                     double *g) {
+  const int r = s->state->model->size.r;
+  const double *k0 = s->state->model->k0;
+  double *d = s->state->work, square = 0;
+  for (int a = 0; a < r; a++) d[a] = x[a] - origin[a];
+  for (int a = 0; a < r; a++) {
+    double sum = ep_dot(r, k0 + (size_t)a * (size_t)r, d);
+    square += d[a] * sum;
+    if (g) g[a] += scale * sum;
+  }
+  return square;
+}
+
+// Elastic and example energy with gradient and Hessian.
+static double inner_energy(step *s, const double *x, double *g, double *h, int project) {
+  ep_state *state = s->state;
+  const ep_step_def *def = s->def;
+  const int as_energy = s->examples && def->example_force == EP_EXAMPLE_ENERGY;
+  state->term[0] = (ep_kernel_term){.scale = 1, .weight = state->model->cubature_w};
+  if (as_energy)
+    state->term[1] = (ep_kernel_term){
+        .scale = def->strength, .inverse = state->target_inverse, .weight = state->target_weight};
+  double energy = ep_evaluate(state, 1 + as_energy, x, g, h, project);
+  s->linear = 0;
+  if (s->examples && !as_energy)
+    s->linear = 0.5 * def->strength * add_k0(s, def->strength, x, state->next_target, g);
+  return energy + s->linear;
+}
+
+static double energy(void *user, const double *x, double *g, double *h, int project) {
+  step *s = user;
+  ep_state *state = s->state;
+  const ep_step_def *def = s->def;
+  const int r = state->model->size.r;
+  const double inertia = 1 / (def->dt * def->dt), drag = def->damping_mass / def->dt;
+  double sum = inner_energy(s, x, g, h, project);
+  if (g) s->internal = sqrt(ep_dot(r, g, g));
+  const double viscous = def->damping_stiffness / def->dt;
+  if (viscous > 0) sum += 0.5 * viscous * add_k0(s, viscous, x, state->q, g);
+  for (int a = 0; a < r; a++) {
+    double ahead = x[a] - state->aside[a], moved = x[a] - state->q[a];
+    double force = def->force ? def->force[a] : 0;
+    sum += 0.5 * (inertia * ahead * ahead + drag * moved * moved) - force * x[a];
+    if (g) g[a] += inertia * ahead + drag * moved - force;
+  }
+  if (!h) return sum;
+  const int linear = s->examples && def->example_force == EP_EXAMPLE_LINEAR;
+  const double stiff = viscous + (linear ? def->strength : 0);
+  for (int i = 0; stiff > 0 && i < r * r; i++) h[i] += stiff * state->model->k0[i];
+  for (int a = 0; a < r; a++) h[(r + 1) * a] += inertia + drag;
+  return sum;
+}
+
+// |gradient| over the forces in play; never less than what a strain of 1e-8 makes.
+static double residual(void *user, const double *x, const double *g) {
+  step *s = user;
+  const ep_state *state = s->state;
+  const int r = state->model->size.r;
+  double ahead = 0, force = s->def->force ? sqrt(ep_dot(r, s->def->force, s->def->force)) : 0;
+  for (int a = 0; a < r; a++) ahead += (x[a] - state->aside[a]) * (x[a] - state->aside[a]);
+  double scale =
+      force + s->internal + sqrt(ahead) / (s->def->dt * s->def->dt) + 1e-8 * state->force_scale;
+  return sqrt(ep_dot(r, g, g)) / scale;
+}
+
+// Start at the free flight or at rest, whichever has the lower potential.
+static void choose_start(step *s) {
+  ep_state *state = s->state;
+  const size_t bytes = (size_t)state->model->size.r * sizeof(double);
+  for (int a = 0; a < state->model->size.r; a++)
+    state->aside[a] = state->q[a] + s->def->dt * state->v[a];
+  double still = energy(s, state->q, NULL, NULL, 0);
+  double flight = energy(s, state->aside, NULL, NULL, 0);
+  memcpy(state->x, flight < still ? state->aside : state->q, bytes);
+}
+
+static void finish(step *s) {
+  ep_state *state = s->state;
+  for (int a = 0; a < state->model->size.r; a++) {
+    state->v[a] = (state->x[a] - state->q[a]) / s->def->dt;
+    state->q[a] = state->x[a];
+  }
+  if (s->examples) ep_commit_target(state);
+}
+
+ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *report) {
+  ep_step_report unused;
+  if (!report) report = &unused;
+  *report = (ep_step_report){0};
+  if (!valid(def)) return EP_ERR_ARGUMENT;
+  step s = {.state = state, .def = def, .examples = state->model->size.k > 0 && def->strength > 0};
+  if (s.examples) {
+    ep_status status = ep_find_target(state, def, &report->target);
+    if (status != EP_OK) return status;
+  }
+  ep_newton newton = {.energy = energy,
+                      .residual = residual,
+                      .user = &s,
+                      .tolerance = def->tolerance,
+                      .max_iterations = def->max_iterations};
+  choose_start(&s);
+  ep_status status = ep_newton_minimise(state, &newton);
+  report->newton_iterations = newton.iterations;
+  report->line_search_steps = newton.line_search_steps;
+  report->projections = newton.projections;
+  report->residual = newton.residual_now;
+  if (status != EP_OK) return status;
+  finish(&s);
+  report->elastic_energy = state->term[0].energy;
+  if (s.examples)
+    report->example_energy =
+        def->example_force == EP_EXAMPLE_ENERGY ? state->term[1].energy : s.linear;
+  report->kinetic_energy = 0.5 * ep_dot(state->model->size.r, state->v, state->v);
+  return EP_OK;
+}
+
+ep_status ep_interpolate(ep_state *state, const ep_step_def *def, ep_target_report *report) {
+  ep_target_report unused;
+  if (!report) report = &unused;
+  *report = (ep_target_report){0};
+  if (!valid(def)) return EP_ERR_ARGUMENT;
+  if (state->model->size.k == 0) return EP_OK;
+  ep_status status = ep_find_target(state, def, report);
+  if (status == EP_OK) ep_commit_target(state);
+  return status;
+}
