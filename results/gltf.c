@@ -1,0 +1,389 @@
+#include "results/gltf.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/files.h"
+
+// glTF 2.0 constants
+enum { FLOAT = 5126, UNSIGNED_INT = 5125, ARRAY_BUFFER = 34962, ELEMENT_ARRAY_BUFFER = 34963 };
+enum { CHUNK_JSON = 0x4E4F534A, CHUNK_BIN = 0x004E4942, MAGIC = 0x46546C67 };
+
+typedef struct writer {
+  const ep_gltf_animation *a;
+  int nv;                                        // vertices on the surface
+  int *vertex;                                   // (nv) surface vertex -> vertex
+  uint32_t *index;                               // (triangles x 3) in surface vertices
+  double *low, *range;                           // (r) of each mode's coordinate
+  float *base, *base_normal, *position, *normal; // (nv x 3); the last two are scratch
+  unsigned char *bin;                            // the binary chunk
+  size_t used, capacity;
+  json_t *views, *accessors;
+  ep_error *err;
+} writer;
+
+ep_gltf_animation ep_default_gltf(void) {
+  return (ep_gltf_animation){
+      .name = "eigenpose", .base_color = {0.55f, 0.62f, 0.75f}, .target_normals = true};
+}
+
+static ep_status check(const ep_gltf_animation *a, ep_error *err) {
+  if (a->n < 1 || a->triangles < 1 || a->r < 0 || a->frames < 0)
+    return ep_fail(err, EP_ERR_ARGUMENT, "glTF: nothing to write (%d vertices, %d triangles)", a->n,
+                   a->triangles);
+  for (int i = 0; i < 3 * a->triangles; i++)
+    if (a->triangle[i] < 0 || a->triangle[i] >= a->n)
+      return ep_fail(err, EP_ERR_ARGUMENT, "glTF: triangle %d uses vertex %d of %d", i / 3,
+                     a->triangle[i], a->n);
+  for (int f = 0; f < a->frames; f++)
+    if (!(a->time[f] >= 0) || isinf(a->time[f]) ||
+        (f > 0 && !((float)a->time[f] > (float)a->time[f - 1])))
+      return ep_fail(err, EP_ERR_ARGUMENT, "glTF: times must ascend from 0; frame %d is at %g s", f,
+                     a->time[f]);
+  const size_t count = (size_t)a->frames * (size_t)a->r;
+  for (size_t i = 0; i < count; i++)
+    if (!isfinite(a->q[i]))
+      return ep_fail(err, EP_ERR_ARGUMENT, "glTF: q%zu of frame %zu is not a number",
+                     i % (size_t)a->r, i / (size_t)a->r);
+  return EP_OK;
+}
+
+// Surface vertices keep their order; index and vertex are filled.
+static ep_status make_index(writer *w) {
+  const ep_gltf_animation *a = w->a;
+  int *number = calloc((size_t)a->n, sizeof *number);
+  w->vertex = malloc((size_t)a->n * sizeof *w->vertex);
+  w->index = malloc((size_t)a->triangles * 3 * sizeof *w->index);
+  if (!number || !w->vertex || !w->index) {
+    free(number);
+    return ep_fail(w->err, EP_ERR_MEMORY, "no memory for a glTF surface of %d triangles",
+                   a->triangles);
+  }
+  for (int i = 0; i < 3 * a->triangles; i++) number[a->triangle[i]] = 1;
+  for (int v = 0; v < a->n; v++)
+    if (number[v]) {
+      w->vertex[w->nv] = v;
+      number[v] = w->nv++;
+    }
+  for (int i = 0; i < 3 * a->triangles; i++) w->index[i] = (uint32_t)number[a->triangle[i]];
+  free(number);
+  return EP_OK;
+}
+
+static ep_status make_ranges(writer *w) {
+  const ep_gltf_animation *a = w->a;
+  const size_t bytes = (size_t)w->nv * 3 * sizeof(float);
+  w->low = calloc((size_t)a->r + 1, sizeof *w->low);
+  w->range = calloc((size_t)a->r + 1, sizeof *w->range);
+  w->base = malloc(bytes);
+  w->base_normal = malloc(bytes);
+  w->position = malloc(bytes);
+  w->normal = malloc(bytes);
+  if (!w->low || !w->range || !w->base || !w->base_normal || !w->position || !w->normal)
+    return ep_fail(w->err, EP_ERR_MEMORY, "no memory for glTF modes (%d vertices)", w->nv);
+  for (int i = 0; i < a->r && a->frames > 0; i++) {
+    double low = a->q[i], high = a->q[i];
+    for (int f = 1; f < a->frames; f++) {
+      const double q = a->q[(size_t)f * (size_t)a->r + (size_t)i];
+      low = fmin(low, q);
+      high = fmax(high, q);
+    }
+    w->low[i] = low;
+    w->range[i] = high - low;
+  }
+  return EP_OK;
+}
+
+// ---- geometry --------------------------------------------------------------------------------
+static void make_base(writer *w) {
+  const ep_gltf_animation *a = w->a;
+  for (int v = 0; v < w->nv; v++)
+    for (int k = 0; k < 3; k++) {
+      const size_t at = 3 * (size_t)w->vertex[v] + (size_t)k;
+      double x = a->x[at];
+      for (int i = 0; i < a->r; i++) x += a->u[(size_t)i * 3 * (size_t)a->n + at] * w->low[i];
+      w->base[3 * v + k] = (float)x;
+    }
+}
+
+static void make_target(writer *w, int mode) {
+  const double *u = w->a->u + (size_t)mode * 3 * (size_t)w->a->n;
+  for (int v = 0; v < w->nv; v++)
+    for (int k = 0; k < 3; k++)
+      w->position[3 * v + k] = (float)(u[3 * (size_t)w->vertex[v] + (size_t)k] * w->range[mode]);
+}
+
+// Area-weighted unit vertex normals at base + target (target may be NULL).
+static void make_normals(const writer *w, const float *target, float *normal) {
+  memset(normal, 0, (size_t)w->nv * 3 * sizeof *normal);
+  for (int t = 0; t < w->a->triangles; t++) {
+    const uint32_t *corner = w->index + 3 * (size_t)t;
+    double p[3][3], e[2][3];
+    for (int c = 0; c < 3; c++)
+      for (int k = 0; k < 3; k++) {
+        const size_t at = 3 * (size_t)corner[c] + (size_t)k;
+        p[c][k] = (double)w->base[at] + (target ? (double)target[at] : 0);
+      }
+    for (int k = 0; k < 3; k++) {
+      e[0][k] = p[1][k] - p[0][k];
+      e[1][k] = p[2][k] - p[0][k];
+    }
+    for (int k = 0; k < 3; k++) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      const float cross = (float)(e[0][i] * e[1][j] - e[0][j] * e[1][i]);
+      for (int c = 0; c < 3; c++) normal[3 * (size_t)corner[c] + (size_t)k] += cross;
+    }
+  }
+  for (int v = 0; v < w->nv; v++) {
+    float *n = normal + 3 * (size_t)v;
+    const double length = sqrt((double)n[0] * (double)n[0] + (double)n[1] * (double)n[1] +
+                               (double)n[2] * (double)n[2]);
+    // glTF demands unit length; where faces cancel any direction will do
+    for (int k = 0; k < 3; k++) n[k] = length > 0 ? (float)((double)n[k] / length) : (k == 2);
+  }
+}
+
+// ---- buffer ----------------------------------------------------------------------------------
+// Append bytes (all counts here are multiples of 4) and a view of them; returns the view's number.
+static ep_status append(writer *w, const void *bytes, size_t size, int target, int *view) {
+  if (size > SIZE_MAX / 4 || w->used + size > UINT32_MAX - (1u << 24))
+    return ep_fail(w->err, EP_ERR_UNSUPPORTED,
+                   "glTF: more than 4 GiB; write fewer modes or leave target normals out");
+  if (w->used + size > w->capacity) {
+    const size_t capacity = 2 * (w->used + size);
+    unsigned char *larger = realloc(w->bin, capacity);
+    if (!larger) return ep_fail(w->err, EP_ERR_MEMORY, "no memory for %zu bytes of glTF", capacity);
+    w->bin = larger;
+    w->capacity = capacity;
+  }
+  memcpy(w->bin + w->used, bytes, size);
+  json_t *entry = json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", (json_int_t)w->used,
+                            "byteLength", (json_int_t)size);
+  if (entry && target) json_object_set_new(entry, "target", json_integer(target));
+  w->used += size;
+  *view = (int)json_array_size(w->views);
+  return json_array_append_new(w->views, entry) == 0
+             ? EP_OK
+             : ep_fail(w->err, EP_ERR_MEMORY, "no memory for glTF text");
+}
+
+// Bounds of single-precision numbers, exact in JSON: glTF wants them to be the data's own.
+static json_t *bounds(const float *data, size_t count, int components, bool highest) {
+  json_t *list = json_array();
+  for (int k = 0; k < components; k++) {
+    float best = data[k];
+    for (size_t i = 1; i < count; i++) {
+      const float value = data[i * (size_t)components + (size_t)k];
+      if (highest ? value > best : value < best) best = value;
+    }
+    json_array_append_new(list, json_real((double)best));
+  }
+  return list;
+}
+
+static ep_status add_floats(writer *w, const float *data, size_t count, int components, int target,
+                            bool bounded, int *accessor) {
+  int view;
+  EP_TRY(append(w, data, count * (size_t)components * sizeof *data, target, &view));
+  json_t *entry =
+      json_pack("{s:i, s:i, s:I, s:s}", "bufferView", view, "componentType", FLOAT, "count",
+                (json_int_t)count, "type", components == 3 ? "VEC3" : "SCALAR");
+  if (entry && bounded) {
+    json_object_set_new(entry, "min", bounds(data, count, components, false));
+    json_object_set_new(entry, "max", bounds(data, count, components, true));
+  }
+  *accessor = (int)json_array_size(w->accessors);
+  return json_array_append_new(w->accessors, entry) == 0
+             ? EP_OK
+             : ep_fail(w->err, EP_ERR_MEMORY, "no memory for glTF text");
+}
+
+static ep_status add_indices(writer *w, int *accessor) {
+  int view;
+  const size_t count = 3 * (size_t)w->a->triangles;
+  EP_TRY(append(w, w->index, count * sizeof *w->index, ELEMENT_ARRAY_BUFFER, &view));
+  *accessor = (int)json_array_size(w->accessors);
+  json_t *entry = json_pack("{s:i, s:i, s:I, s:s}", "bufferView", view, "componentType",
+                            UNSIGNED_INT, "count", (json_int_t)count, "type", "SCALAR");
+  return json_array_append_new(w->accessors, entry) == 0
+             ? EP_OK
+             : ep_fail(w->err, EP_ERR_MEMORY, "no memory for glTF text");
+}
+
+static ep_status add_colors(writer *w, json_t *attributes) {
+  if (!w->a->color) return EP_OK;
+  for (int v = 0; v < w->nv; v++)
+    for (int k = 0; k < 3; k++)
+      w->position[3 * v + k] =
+          fminf(1, fmaxf(0, w->a->color[3 * (size_t)w->vertex[v] + (size_t)k]));
+  int accessor;
+  EP_TRY(add_floats(w, w->position, (size_t)w->nv, 3, ARRAY_BUFFER, false, &accessor));
+  json_object_set_new(attributes, "COLOR_0", json_integer(accessor));
+  return EP_OK;
+}
+
+static ep_status add_targets(writer *w, json_t *targets) {
+  for (int mode = 0; mode < w->a->r; mode++) {
+    int position, normal;
+    make_target(w, mode);
+    EP_TRY(add_floats(w, w->position, (size_t)w->nv, 3, ARRAY_BUFFER, true, &position));
+    json_t *target = json_pack("{s:i}", "POSITION", position);
+    json_array_append_new(targets, target);
+    if (!w->a->target_normals) continue;
+    make_normals(w, w->position, w->normal);
+    for (int i = 0; i < 3 * w->nv; i++) w->normal[i] -= w->base_normal[i];
+    EP_TRY(add_floats(w, w->normal, (size_t)w->nv, 3, ARRAY_BUFFER, false, &normal));
+    json_object_set_new(target, "NORMAL", json_integer(normal));
+  }
+  return EP_OK;
+}
+
+static ep_status add_primitive(writer *w, json_t *primitive) {
+  json_t *attributes = json_object(), *targets = json_array();
+  json_object_set_new(primitive, "attributes", attributes);
+  json_object_set_new(primitive, "material", json_integer(0));
+  json_object_set_new(primitive, "targets", targets);
+  int accessor;
+  EP_TRY(add_indices(w, &accessor));
+  json_object_set_new(primitive, "indices", json_integer(accessor));
+  make_base(w);
+  EP_TRY(add_floats(w, w->base, (size_t)w->nv, 3, ARRAY_BUFFER, true, &accessor));
+  json_object_set_new(attributes, "POSITION", json_integer(accessor));
+  make_normals(w, NULL, w->base_normal);
+  EP_TRY(add_floats(w, w->base_normal, (size_t)w->nv, 3, ARRAY_BUFFER, false, &accessor));
+  json_object_set_new(attributes, "NORMAL", json_integer(accessor));
+  EP_TRY(add_colors(w, attributes));
+  EP_TRY(add_targets(w, targets));
+  if (w->a->r == 0) json_object_del(primitive, "targets");
+  return EP_OK;
+}
+
+// ---- animation -------------------------------------------------------------------------------
+static float weight(const writer *w, int frame, int mode) {
+  if (!(w->range[mode] > 0)) return 0;
+  const double q = w->a->q[(size_t)frame * (size_t)w->a->r + (size_t)mode];
+  return (float)((q - w->low[mode]) / w->range[mode]);
+}
+
+static ep_status add_animation(writer *w, json_t *root) {
+  const ep_gltf_animation *a = w->a;
+  if (a->frames == 0 || a->r == 0) return EP_OK;
+  const size_t count = (size_t)a->frames * (size_t)a->r;
+  float *values = malloc((count + (size_t)a->frames) * sizeof *values), *times = values + count;
+  if (!values) return ep_fail(w->err, EP_ERR_MEMORY, "no memory for %d glTF frames", a->frames);
+  for (int f = 0; f < a->frames; f++) {
+    times[f] = (float)a->time[f];
+    for (int i = 0; i < a->r; i++) values[(size_t)f * (size_t)a->r + (size_t)i] = weight(w, f, i);
+  }
+  int input, output;
+  ep_status status = add_floats(w, times, (size_t)a->frames, 1, 0, true, &input);
+  if (status == EP_OK) status = add_floats(w, values, count, 1, 0, false, &output);
+  free(values);
+  EP_TRY(status);
+  json_object_set_new(root, "animations",
+                      json_pack("[{s:s, s:[{s:i, s:{s:i, s:s}}], s:[{s:i, s:i, s:s}]}]", "name",
+                                "trajectory", "channels", "sampler", 0, "target", "node", 0, "path",
+                                "weights", "samplers", "input", input, "output", output,
+                                "interpolation", "LINEAR"));
+  return EP_OK;
+}
+
+// Weights at the first frame (without frames: at rest), and the targets' names for editors.
+static void add_mesh(const writer *w, json_t *root, json_t *primitive) {
+  json_t *mesh = json_pack("{s:s, s:[O]}", "name", w->a->name, "primitives", primitive);
+  if (w->a->r > 0) {
+    json_t *weights = json_array(), *names = json_array();
+    for (int i = 0; i < w->a->r; i++) {
+      char name[32];
+      snprintf(name, sizeof name, "mode %d", i);
+      json_array_append_new(names, json_string(name));
+      json_array_append_new(weights, json_real(w->a->frames ? (double)weight(w, 0, i) : 0));
+    }
+    json_object_set_new(mesh, "weights", weights);
+    json_object_set_new(mesh, "extras", json_pack("{s:o}", "targetNames", names));
+  }
+  json_object_set_new(root, "meshes", json_pack("[o]", mesh));
+}
+
+static json_t *make_root(const writer *w) {
+  const float *c = w->a->base_color;
+  json_t *root = json_pack("{s:{s:s, s:s}, s:i, s:[{s:[i]}], s:[{s:i, s:s}]}", "asset", "version",
+                           "2.0", "generator", "Eigenpose", "scene", 0, "scenes", "nodes", 0,
+                           "nodes", "mesh", 0, "name", w->a->name);
+  if (!root) return NULL;
+  json_object_set_new(root, "materials",
+                      json_pack("[{s:{s:[f,f,f,f], s:f, s:f}, s:b}]", "pbrMetallicRoughness",
+                                "baseColorFactor", (double)c[0], (double)c[1], (double)c[2], 1.0,
+                                "metallicFactor", 0.0, "roughnessFactor", 0.6, "doubleSided", 1));
+  return root;
+}
+
+static void put_u32(FILE *file, size_t value) {
+  for (int byte = 0; byte < 4; byte++) fputc((int)(value >> (8 * byte) & 255), file);
+}
+
+// Header (12 bytes), JSON chunk padded with blanks, binary chunk padded with zeros.
+static ep_status write_container(const char *path, const char *text, const writer *w) {
+  const size_t length = strlen(text), padded = (length + 3) / 4 * 4, bin = (w->used + 3) / 4 * 4;
+  ep_output out;
+  EP_TRY(ep_output_open(&out, path, w->err));
+  put_u32(out.file, MAGIC);
+  put_u32(out.file, 2);
+  put_u32(out.file, 12 + 8 + padded + 8 + bin);
+  put_u32(out.file, padded);
+  put_u32(out.file, CHUNK_JSON);
+  fwrite(text, 1, length, out.file);
+  for (size_t i = length; i < padded; i++) fputc(' ', out.file);
+  put_u32(out.file, bin);
+  put_u32(out.file, CHUNK_BIN);
+  fwrite(w->bin, 1, w->used, out.file);
+  for (size_t i = w->used; i < bin; i++) fputc(0, out.file);
+  return ep_output_commit(&out, w->err);
+}
+
+static ep_status write_all(const char *path, writer *w, json_t *root) {
+  json_t *primitive = json_object();
+  ep_status status = primitive ? add_primitive(w, primitive) : EP_ERR_MEMORY;
+  if (status == EP_OK) add_mesh(w, root, primitive);
+  json_decref(primitive);
+  EP_TRY(status);
+  EP_TRY(add_animation(w, root));
+  json_object_set(root, "accessors", w->accessors);
+  json_object_set(root, "bufferViews", w->views);
+  json_object_set_new(root, "buffers",
+                      json_pack("[{s:I}]", "byteLength", (json_int_t)((w->used + 3) / 4 * 4)));
+  char *text = json_dumps(root, JSON_COMPACT | JSON_REAL_PRECISION(9));
+  if (!text)
+    return ep_fail(w->err, EP_ERR_ARGUMENT, "glTF: name or numbers cannot be written as JSON");
+  status = write_container(path, text, w);
+  free(text);
+  return status;
+}
+
+ep_status ep_gltf_write(const char *path, const ep_gltf_animation *animation, ep_error *err) {
+  EP_TRY(check(animation, err));
+  writer w = {.a = animation, .views = json_array(), .accessors = json_array(), .err = err};
+  json_t *root = make_root(&w);
+  ep_status status = EP_OK;
+  if (!root || !w.views || !w.accessors)
+    status = ep_fail(err, EP_ERR_ARGUMENT, "glTF: name is not UTF-8, or no memory");
+  if (status == EP_OK) status = make_index(&w);
+  if (status == EP_OK) status = make_ranges(&w);
+  if (status == EP_OK) status = write_all(path, &w, root);
+  json_decref(root);
+  json_decref(w.views);
+  json_decref(w.accessors);
+  free(w.vertex);
+  free(w.index);
+  free(w.low);
+  free(w.range);
+  free(w.base);
+  free(w.base_normal);
+  free(w.position);
+  free(w.normal);
+  free(w.bin);
+  return status;
+}
