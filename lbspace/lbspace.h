@@ -31,6 +31,11 @@ void ep_lb_reconstruct(const ep_lb *lb, const double *d, double *u);
 
 // Complete a pose: the shape whose low LB coefficients are Phi^T M X + d and which is otherwise as
 // rigid as possible (LB-ARAP, DESIGN "Example poses on the object's mesh").
+// Nothing held: the coefficients are met exactly; the mean displacement (the constant function) is
+// zero. Held vertices: that pose is first moved rigidly so that they come to rest as well as they
+// can, its coefficients become the target, and a second LB-ARAP among the displacements that vanish
+// there meets them up to coefficient_error (see pose_solver.c). Descriptors of the pose are then
+// those of the u found (ep_lb_project), not d.
 typedef struct ep_pose_options {
   int m;                     // coefficients used, <= lb->m
   int iterations;            // about 100
@@ -42,10 +47,14 @@ ep_pose_options ep_default_pose_options(void);
 typedef struct ep_pose_report {
   int iterations, inverted_tets;
   double worst_volume_ratio; // smallest deformed / rest tet volume
-  double coefficient_error;  // |Phi^T M u - d| / |d| at the end (0 unless vertices are held)
+  double coefficient_error;  // |Phi^T M u - target| / |target| at the end; the target is d, or the
+                             // coefficients of the seated pose; round-off unless vertices are held
 } ep_pose_report;
 
-// d (m x 3) [length^(1 + 3/2)], u (n x 3) the displacement found.
+// d (options->m x 3) [length^(1 + 3/2)], u (n x 3) the displacement found; report may be NULL.
+// Errors: EP_ERR_ARGUMENT for m out of range or a coefficient that is not finite,
+// EP_ERR_UNSUPPORTED where some component of the mesh has held vertices and another none,
+// EP_ERR_NUMERIC.
 ep_status ep_lb_pose(const ep_mesh *mesh, const ep_lb *lb, const double *d,
                      const ep_pose_options *options, double *u, ep_pose_report *report,
                      ep_error *err);
