@@ -316,7 +316,9 @@ static ep_status read_byte_order(msh *m, ep_error *err) {
     m->scan.at = m->scan.mark;
     EP_TRY(ep_scan_i32(&m->scan, true, "the byte order mark", &one, err));
   }
-  return one == 1 ? EP_OK : ep_scan_fail_byte(&m->scan, err, "not a Gmsh byte order mark");
+  if (one == 1) return EP_OK;
+  m->scan.at = m->scan.mark;
+  return ep_scan_fail_byte(&m->scan, err, "not a Gmsh byte order mark");
 }
 
 static ep_status read_format(msh *m, ep_error *err) {
