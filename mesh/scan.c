@@ -18,9 +18,13 @@ ep_scan ep_scan_open(const char *name, const char *bytes, size_t size, char comm
       .name = name, .start = bytes, .at = at, .end = bytes + size, .mark = at, .comment = comment};
 }
 
+// Of the mark; at the end of the file the last line that holds something.
 static int line_of(const ep_scan *scan) {
+  const char *mark = scan->mark;
+  if (mark == scan->end)
+    while (mark > scan->start && strchr(" \t\r\n", mark[-1]) && mark[-1]) mark--;
   int line = 1;
-  for (const char *p = scan->start; p < scan->mark; p++) line += *p == '\n';
+  for (const char *p = scan->start; p < mark; p++) line += *p == '\n';
   return line;
 }
 
