@@ -143,6 +143,8 @@ static void fit(const ep_view *view, int first, int last, const ep_panel *panel,
   radius = sqrt(radius);
   camera->distance =
       view->perspective > 0 && radius > 0 ? radius / sin(view->perspective * pi / 360) : 0;
+  camera->scale = 1;
+  camera->offset[0] = camera->offset[1] = 0;
   extent screen = nothing;
   screen.camera = camera;
   screen.frame = frame;
