@@ -1,0 +1,77 @@
+// The bake: every stage is taken from the cache or computed and stored, and only when something
+// later needs it. Runs in the baker process (PETSc).
+#ifndef EP_APP_BAKE_H
+#define EP_APP_BAKE_H
+
+#include "align/align.h"
+#include "app/plan.h"
+#include "cubature/cubature.h"
+#include "lbspace/lbspace.h"
+#include "reduced/bake/basis.h"
+
+// What an example's pose on the object's mesh is worth.
+typedef struct ep_pose_quality {
+  double iterations, inverted_tets, worst_volume_ratio, coefficient_error; // of LB-ARAP
+  double fixed_shift; // how far the fixed vertices had to be brought back / diagonal (rms)
+} ep_pose_quality;
+
+typedef struct ep_bake {
+  const ep_scene *scene;
+  const ep_shapes *shapes;
+  ep_plan *plan; // cached and seconds of its stages are filled in
+  const ep_cache *cache;
+  ep_log *log;
+  bool petsc; // started by the first stage that is computed
+  // results so far; zero until needed
+  ep_lb *lb;                // (shapes->count)
+  ep_csr *mass;             // (shapes->count) LB mass matrices
+  ep_map *map;              // (plan->count), by stage number
+  double *poses;            // (examples x 3n) displacements
+  ep_pose_quality *quality; // (examples)
+  ep_fem fem;
+  ep_modes modes;
+  double *paths; // (examples * samples x 3n)
+  ep_basis basis;
+  ep_cubature cubature;
+} ep_bake;
+
+// scene, shapes, plan, cache, log are borrowed.
+ep_status ep_bake_open(const ep_scene *scene, const ep_shapes *shapes, ep_plan *plan,
+                       const ep_cache *cache, ep_log *log, ep_bake *out, ep_error *err);
+void ep_bake_close(ep_bake *bake);
+
+// Make sure a result is there. Each asks for what it needs itself.
+ep_status ep_bake_lb(ep_bake *bake, int shape, ep_error *err);
+// *out is borrowed. A bad map is no error here.
+ep_status ep_bake_map(ep_bake *bake, ep_stage *stage, const ep_map **out, ep_error *err);
+// EP_ERR_MATCH where a map is bad and the family does not accept it.
+ep_status ep_bake_poses(ep_bake *bake, ep_error *err);
+ep_status ep_bake_fem(ep_bake *bake, ep_error *err);
+ep_status ep_bake_modes(ep_bake *bake, ep_error *err);
+ep_status ep_bake_paths(ep_bake *bake, ep_error *err);
+ep_status ep_bake_basis(ep_bake *bake, ep_error *err);
+ep_status ep_bake_cubature(ep_bake *bake, ep_error *err);
+// The whole bake; path (EP_PATH_MAX) receives the model file in the cache. Stages that were not
+// even looked at, because a later result was there, count as cached.
+ep_status ep_bake_model(ep_bake *bake, char *path, ep_error *err);
+
+// ---- shared by the stage files ---------------------------------------------------------------
+// A stage under way: either found (artifact open) or to be computed; ep_bake_end takes the time.
+typedef struct ep_bake_step {
+  ep_stage *stage;
+  ep_artifact artifact;
+  bool found;
+  double started;
+} ep_bake_step;
+// Looks the stage up in the cache.
+void ep_bake_begin(ep_bake *bake, ep_stage *stage, ep_bake_step *step);
+// What was found does not have the arrays it should: it will be computed after all.
+void ep_bake_reject(ep_bake *bake, ep_bake_step *step);
+// To be called before computing, after what the stage builds on is there: starts PETSc once.
+ep_status ep_bake_compute(ep_bake *bake, ep_bake_step *step, ep_error *err);
+void ep_bake_end(ep_bake_step *step);
+// Copy count doubles or ints out of the artifact into new memory; false where they are not there.
+bool ep_bake_take(const ep_bake_step *step, const char *name, size_t count, double **out);
+bool ep_bake_take_int(const ep_bake_step *step, const char *name, size_t count, int **out);
+
+#endif

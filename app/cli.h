@@ -1,0 +1,40 @@
+// The command line, the same for the command and for the baker.
+#ifndef EP_APP_CLI_H
+#define EP_APP_CLI_H
+
+#include <stdbool.h>
+
+#include "base/error.h"
+
+#define EP_VERSION "0.1.0"
+
+enum { EP_SETS_MAX = 64 };
+
+typedef enum ep_command {
+  EP_COMMAND_EIGEN,
+  EP_COMMAND_ALIGN,
+  EP_COMMAND_PLAN,
+  EP_COMMAND_BAKE,
+  EP_COMMAND_RUN,
+  EP_COMMANDS
+} ep_command;
+
+typedef struct ep_cli {
+  ep_command command;
+  const char *input; // mesh or scene
+  const char *out, *cache;
+  int count; // eigen: eigenpairs wanted
+  bool json, quiet;
+  int nsets;
+  const char *set[EP_SETS_MAX];
+} ep_cli;
+
+// Parse; --help, --version and mistakes end the process (argp), mistakes with status
+// EP_ERR_ARGUMENT.
+void ep_cli_parse(int argc, char **argv, ep_cli *out);
+
+// Say a failure: on stderr, and with --json as {"error": ...} on stdout. Returns the exit code:
+// the number of the status (README "Exit codes").
+int ep_cli_fail(const ep_cli *cli, const ep_error *err);
+
+#endif

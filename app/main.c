@@ -1,0 +1,22 @@
+// The command `eigenpose`. It links neither PETSc nor SLEPc: what needs them is done by the baker,
+// a program of its own in libexec.
+#include "app/process.h"
+#include "app/run.h"
+
+static ep_status perform(const ep_cli *cli, char **argv, ep_error *err) {
+  switch (cli->command) {
+  case EP_COMMAND_PLAN:
+    return ep_command_plan(cli, err);
+  case EP_COMMAND_RUN:
+    return ep_command_run(cli, err);
+  default:
+    return ep_baker_become(argv, err);
+  }
+}
+
+int main(int argc, char **argv) {
+  ep_cli cli;
+  ep_error err = {0};
+  ep_cli_parse(argc, argv, &cli);
+  return perform(&cli, argv, &err) == EP_OK ? 0 : ep_cli_fail(&cli, &err);
+}

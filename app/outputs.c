@@ -1,0 +1,232 @@
+#include "app/outputs.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "mesh/io.h"
+#include "results/csv.h"
+#include "results/gltf.h"
+#include "results/picture.h"
+
+enum { PANELS = 6, PATH_SHORT = 64 };
+
+static ep_status no_memory(ep_error *err) {
+  return ep_fail(err, EP_ERR_MEMORY, "no memory to write the results");
+}
+
+// ---- frames ----------------------------------------------------------------------------------
+
+// Rows of the record that become frames: every `every`-th, and the last.
+static int frame_rows(const ep_scene *scene, const ep_record *record, int *row) {
+  int count = 0;
+  for (int i = 0; i < record->rows; i += scene->every) row[count++] = i;
+  if (count && row[count - 1] != record->rows - 1) row[count++] = record->rows - 1;
+  return count;
+}
+
+static ep_status write_frame(const char *path, const ep_mesh *mesh, const ep_model *model,
+                             const double *q, double *x, double *u, ep_error *err) {
+  ep_positions(model, q, x);
+  for (size_t i = 0; i < 3 * (size_t)mesh->nv; i++) u[i] = x[i] - mesh->x[i];
+  const ep_field field = {"displacement", 3, u};
+  return ep_mesh_write_vtu(path, mesh, x, 1, &field, 0, NULL, err);
+}
+
+static ep_status write_vtu(const char *folder, const ep_mesh *mesh, const ep_model *model,
+                           const ep_record *record, int frames, const int *row, ep_log *log,
+                           ep_error *err) {
+  const size_t r = (size_t)model->size.r, count = (size_t)frames;
+  char path[EP_PATH_MAX];
+  char(*name)[PATH_SHORT] = calloc(count, sizeof *name);
+  const char **names = calloc(count, sizeof *names);
+  double *time = calloc(count, sizeof *time), *x = calloc(6 * (size_t)mesh->nv, sizeof *x);
+  ep_status status = name && names && time && x ? EP_OK : no_memory(err);
+  if (status == EP_OK) status = ep_path_join(folder, "frames", path, err);
+  if (status == EP_OK) status = ep_make_folders(path, err);
+  ep_progress_begin(log, "frames", frames);
+  for (int i = 0; i < frames && status == EP_OK; i++) {
+    snprintf(name[i], sizeof name[i], "frames/frame-%04d.vtu", i);
+    names[i] = name[i];
+    time[i] = record->time[row[i]];
+    status = ep_path_join(folder, name[i], path, err);
+    if (status == EP_OK)
+      status = write_frame(path, mesh, model, record->q + (size_t)row[i] * r, x,
+                           x + 3 * (size_t)mesh->nv, err);
+    ep_progress(log, i + 1);
+  }
+  ep_progress_end(log);
+  if (status == EP_OK) status = ep_path_join(folder, "animation.pvd", path, err);
+  if (status == EP_OK) status = ep_mesh_write_pvd(path, frames, time, names, err);
+  free(name);
+  free(names);
+  free(time);
+  free(x);
+  return status;
+}
+
+static ep_status write_glb(const char *folder, const ep_scene *scene, const ep_mesh *mesh,
+                           const ep_model *model, const ep_record *record, int frames,
+                           const int *row, ep_error *err) {
+  const size_t r = (size_t)model->size.r;
+  char path[EP_PATH_MAX];
+  int *triangle = NULL;
+  ep_gltf_animation a = ep_default_gltf();
+  double *q = calloc((size_t)frames * (r + 1), sizeof *q), *time = q + (size_t)frames * r;
+  ep_status status = q ? ep_mesh_surface(mesh, &a.triangles, &triangle, err) : no_memory(err);
+  for (int i = 0; i < frames && status == EP_OK; i++) {
+    memcpy(q + (size_t)i * r, record->q + (size_t)row[i] * r, r * sizeof *q);
+    time[i] = record->time[row[i]];
+  }
+  if (status == EP_OK) status = ep_path_join(folder, "animation.glb", path, err);
+  if (status == EP_OK) {
+    a.name = scene->name;
+    a.n = mesh->nv;
+    a.r = model->size.r;
+    a.frames = frames;
+    a.x = mesh->x;
+    a.u = model->u;
+    a.q = q;
+    a.time = time;
+    a.triangle = triangle;
+    status = ep_gltf_write(path, &a, err);
+  }
+  free(triangle);
+  free(q);
+  return status;
+}
+
+// ---- picture ---------------------------------------------------------------------------------
+
+// Panels: rest, equally spaced moments, the end; then each example as the object would wear it.
+static ep_status write_png(const char *folder, const ep_scene *scene, const ep_mesh *mesh,
+                           const ep_model *model, const ep_record *record, ep_error *err) {
+  const int examples = model->size.k < 3 ? model->size.k : 3;
+  const int moments = record->rows < PANELS ? record->rows : PANELS;
+  const size_t n3 = 3 * (size_t)mesh->nv, r = (size_t)model->size.r;
+  char path[EP_PATH_MAX], label[PANELS + 3][PATH_SHORT];
+  ep_drawing drawing[PANELS + 3];
+  ep_panel panel[PANELS + 3];
+  int triangles, *triangle = NULL, count = moments + examples;
+  double *x = calloc((size_t)count * n3, sizeof *x);
+  ep_status status = x ? ep_mesh_surface(mesh, &triangles, &triangle, err) : no_memory(err);
+  for (int i = 0; i < count && status == EP_OK; i++) {
+    const int row = moments > 1 ? i * (record->rows - 1) / (moments - 1) : 0;
+    double *at = x + (size_t)i * n3;
+    if (i < moments) {
+      ep_positions(model, record->q + (size_t)row * r, at);
+      snprintf(label[i], sizeof label[i], "t = %.2f s", record->time[row]);
+    } else {
+      ep_positions(model, model->example_q + (size_t)(i - moments) * r, at);
+      snprintf(label[i], sizeof label[i], "example %d", i - moments + 1);
+    }
+    drawing[i] = ep_default_drawing(mesh->nv, at, triangles, triangle);
+    if (i >= moments) {
+      const float tint[3] = {0.85f, 0.55f, 0.25f};
+      memcpy(drawing[i].tint, tint, sizeof tint);
+    }
+    panel[i] = (ep_panel){.drawings = 1, .drawing = &drawing[i], .label = label[i]};
+  }
+  if (status == EP_OK) status = ep_path_join(folder, "strip.png", path, err);
+  if (status == EP_OK) {
+    ep_view view = ep_default_view();
+    view.shared = true;
+    view.columns = count > 4 ? (count + 1) / 2 : 0;
+    view.title = scene->name;
+    status = ep_picture_write(path, &view, count, panel, err);
+  }
+  free(triangle);
+  free(x);
+  return status;
+}
+
+// ---- tables ----------------------------------------------------------------------------------
+
+static ep_status write_csv(const char *folder, const ep_model *model, const ep_record *record,
+                           ep_error *err) {
+  char path[EP_PATH_MAX];
+  EP_TRY(ep_path_join(folder, "trajectory.csv", path, err));
+  const ep_csv_group groups[] = {
+      {.name = "t", .components = 1, .data = record->time},
+      {.name = "q", .components = model->size.r, .data = record->q, .numbered = true},
+      {.name = "w",
+       .components = record->weights ? model->size.k + 1 : 0,
+       .data = record->weights,
+       .numbered = true},
+  };
+  return ep_csv_write(path, record->rows, 3, groups, err);
+}
+
+ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_shapes *shapes,
+                           const ep_model *model, const ep_record *record, ep_log *log,
+                           ep_error *err) {
+  const ep_mesh *mesh = &shapes->shape[0].mesh;
+  if (record->rows == 0) return EP_OK;
+  EP_TRY(ep_make_folders(folder, err));
+  EP_TRY(write_csv(folder, model, record, err));
+  int *row = malloc(((size_t)record->rows + 1) * sizeof *row);
+  if (!row) return no_memory(err);
+  const int frames = frame_rows(scene, record, row);
+  ep_status status = EP_OK;
+  if (scene->formats & EP_FORMAT_VTU)
+    status = write_vtu(folder, mesh, model, record, frames, row, log, err);
+  if (status == EP_OK && (scene->formats & EP_FORMAT_GLB))
+    status = write_glb(folder, scene, mesh, model, record, frames, row, err);
+  if (status == EP_OK && (scene->formats & EP_FORMAT_PNG))
+    status = write_png(folder, scene, mesh, model, record, err);
+  free(row);
+  return status;
+}
+
+// ---- summary ---------------------------------------------------------------------------------
+
+static double number(const json_t *object, const char *key) {
+  const json_t *value = json_object_get(object, key);
+  return json_is_number(value) ? json_number_value(value) : NAN;
+}
+
+static void text_weights(FILE *out, const json_t *report) {
+  const json_t *weights = json_object_get(report, "weights");
+  if (json_array_size(weights) == 0) return;
+  fprintf(out, "final weights: rest %.3f", json_number_value(json_array_get(weights, 0)));
+  for (size_t i = 1; i < json_array_size(weights); i++)
+    fprintf(out, ", example %zu %.3f", i, json_number_value(json_array_get(weights, i)));
+  fprintf(out, "\nexample fraction: %.3f of the way from rest to the nearest example\n",
+          number(report, "example_fraction"));
+}
+
+void ep_summary_text(FILE *out, const json_t *report) {
+  size_t index;
+  json_t *stage;
+  fprintf(out, "%s: %.0f vertices, %.0f tets, %.0f examples\n",
+          json_string_value(json_object_get(report, "scene")), number(report, "vertices"),
+          number(report, "tets"), number(report, "examples"));
+  fprintf(out, "m = %.0f eigenfunctions, r = %.0f modes, s = %.0f cubature elements\n",
+          number(report, "m"), number(report, "r"), number(report, "s"));
+  json_array_foreach(json_object_get(report, "stages"), index, stage) fprintf(
+      out, "  %-30s %8.3f s%s\n", json_string_value(json_object_get(stage, "name")),
+      number(stage, "seconds"), json_is_true(json_object_get(stage, "cached")) ? "  (cached)" : "");
+  const json_t *error = json_object_get(report, "cubature_error");
+  fprintf(out, "cubature: relative force error %.3g in training, %.3g held out\n",
+          number(error, "train"), number(error, "held_out"));
+  fprintf(out, "%.0f of %.0f steps of %.4g s; median %.3f ms a step, %.3f ms of it interpolation\n",
+          number(report, "steps_done"), number(report, "steps"), number(report, "dt"),
+          number(report, "t_step_ms"), number(report, "t_interp_ms"));
+  text_weights(out, report);
+  fprintf(out, "inverted tets: at most %.0f after any step\n", number(report, "inverted_tets"));
+}
+
+ep_status ep_outputs_summary(const char *folder, const json_t *report, ep_error *err) {
+  char path[EP_PATH_MAX];
+  ep_output out;
+  EP_TRY(ep_make_folders(folder, err));
+  EP_TRY(ep_path_join(folder, "summary.json", path, err));
+  EP_TRY(ep_output_open(&out, path, err));
+  json_dumpf(report, out.file, JSON_INDENT(2) | JSON_REAL_PRECISION(15));
+  fputc('\n', out.file);
+  EP_TRY(ep_output_commit(&out, err));
+  EP_TRY(ep_path_join(folder, "summary.txt", path, err));
+  EP_TRY(ep_output_open(&out, path, err));
+  ep_summary_text(out.file, report);
+  return ep_output_commit(&out, err);
+}

@@ -1,0 +1,345 @@
+#include "app/scene.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "app/scene_load.h"
+#include "base/files.h"
+
+enum { SCENE_BYTES_MAX = 1 << 20 };
+
+// What the conversion of one scene needs everywhere.
+typedef struct reader {
+  ep_scene_text *loaded;
+  const char *name, *folder;
+  bool overridden; // with --set the places of the file no longer tell
+  ep_error *err;
+} reader;
+
+// A complaint about the value at a dotted key.
+static ep_status bad(const reader *r, const char *key, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+static ep_status bad(const reader *r, const char *key, const char *format, ...) {
+  char text[512];
+  va_list args;
+  va_start(args, format);
+  vsnprintf(text, sizeof text, format, args);
+  va_end(args);
+  int line, column;
+  ep_yaml_locate(&r->loaded->yaml, key, &line, &column);
+  return ep_fail(r->err, EP_ERR_SCENE, "%s:%d:%d: %s: %s%s", r->name, line, column, key, text,
+                 r->overridden ? " (with --set)" : "");
+}
+
+static ep_status number(const reader *r, const char *key, const double *given, double fallback,
+                        double low, double high, double *out) {
+  *out = given ? *given : fallback;
+  if (!isfinite(*out) || *out < low || *out > high)
+    return bad(r, key, "%g is out of range; use %g to %g", *out, low, high);
+  return EP_OK;
+}
+
+static ep_status whole(const reader *r, const char *key, const double *given, int fallback, int low,
+                       int high, int *out) {
+  double value;
+  EP_TRY(number(r, key, given, fallback, low, high, &value));
+  if (value != floor(value)) return bad(r, key, "%g is not a whole number", value);
+  *out = (int)value;
+  return EP_OK;
+}
+
+static ep_status vector(const reader *r, const char *key, const double *given, double *out) {
+  for (int i = 0; i < 3; i++) {
+    if (!isfinite(given[i]) || fabs(given[i]) > 1e12)
+      return bad(r, key, "component %d is %g; use finite numbers", i, given[i]);
+    out[i] = given[i];
+  }
+  return EP_OK;
+}
+
+static ep_status copy_text(const reader *r, const char *text, char **out) {
+  *out = strdup(text);
+  return *out ? EP_OK : ep_fail(r->err, EP_ERR_MEMORY, "no memory for the scene");
+}
+
+// Resolve a path relative to the scene and see that the file is there.
+static ep_status file(const reader *r, const char *key, const char *path, char **out) {
+  char joined[EP_PATH_MAX];
+  EP_TRY(ep_path_join(r->folder, path, joined, r->err));
+  if (!ep_path_exists(joined)) return bad(r, key, "there is no file %s", joined);
+  return copy_text(r, joined, out);
+}
+
+static ep_status selection(const reader *r, const char *key, const raw_box *box,
+                           const raw_plane *plane, const char *path, ep_selection *out) {
+  snprintf(out->key, sizeof out->key, "%s", key);
+  if ((box != NULL) + (plane != NULL) + (path != NULL) != 1)
+    return bad(r, key, "give one of box, plane, file");
+  if (path) {
+    out->kind = EP_SELECT_FILE;
+    return file(r, key, path, &out->path);
+  }
+  out->kind = box ? EP_SELECT_BOX : EP_SELECT_PLANE;
+  EP_TRY(vector(r, key, box ? box->low : plane->point, out->a));
+  EP_TRY(vector(r, key, box ? box->high : plane->normal, out->b));
+  for (int i = 0; box && i < 3; i++)
+    if (out->a[i] > out->b[i])
+      return bad(r, key, "box: low %g lies above high %g on axis %d", out->a[i], out->b[i], i);
+  if (plane && out->b[0] == 0 && out->b[1] == 0 && out->b[2] == 0)
+    return bad(r, key, "plane: the normal is zero");
+  return EP_OK;
+}
+
+static ep_status no_memory(const reader *r) {
+  return ep_fail(r->err, EP_ERR_MEMORY, "no memory for the scene");
+}
+
+static ep_status read_object(const reader *r, const raw_object *raw, ep_scene *out) {
+  EP_TRY(file(r, "object.mesh", raw->mesh, &out->mesh));
+  out->model = EP_STVK_VOLUME;
+  const raw_material *m = raw->material;
+  if (!m) return EP_OK;
+  if (m->model) out->model = (ep_material)*m->model;
+  const int given = (m->density != NULL) + (m->young != NULL) + (m->poisson != NULL);
+  if (given == 0) return EP_OK;
+  if (given < 3)
+    return bad(r, "object.material",
+               "give all of density, young, poisson, or none of them "
+               "(then the mesh file's own are used)");
+  out->has_material = true;
+  EP_TRY(number(r, "object.material.density", m->density, 0, 1e-9, 1e9, &out->material.density));
+  EP_TRY(number(r, "object.material.young", m->young, 0, 1e-9, 1e15, &out->material.young));
+  EP_TRY(number(r, "object.material.poisson", m->poisson, 0, 0, 0.4999, &out->material.poisson));
+  return EP_OK;
+}
+
+static ep_status read_fixed(const reader *r, const raw_scene *raw, ep_scene *out) {
+  if (!raw->fixed_count) return EP_OK;
+  out->fixed = calloc(raw->fixed_count, sizeof *out->fixed);
+  if (!out->fixed) return no_memory(r);
+  for (unsigned i = 0; i < raw->fixed_count; i++) {
+    char key[64];
+    snprintf(key, sizeof key, "fixed.%u", i);
+    out->nfixed++;
+    EP_TRY(selection(r, key, raw->fixed[i].box, raw->fixed[i].plane, raw->fixed[i].file,
+                     &out->fixed[i]));
+  }
+  return EP_OK;
+}
+
+static ep_status read_family(const reader *r, unsigned index, const raw_family *raw,
+                             ep_family *out) {
+  char key[64], fallback[32];
+  snprintf(fallback, sizeof fallback, "family%u", index);
+  EP_TRY(copy_text(r, raw->name ? raw->name : fallback, &out->name));
+  snprintf(key, sizeof key, "families.%u.name", index);
+  if (strlen(out->name) > 24 || strpbrk(out->name, "/ \t\n"))
+    return bad(r, key, "use at most 24 characters, without '/' and blanks");
+  snprintf(key, sizeof key, "families.%u.rest", index);
+  if (raw->rest) EP_TRY(file(r, key, raw->rest, &out->rest));
+  out->pose = calloc(raw->poses_count, sizeof *out->pose);
+  if (!out->pose) return no_memory(r);
+  for (unsigned i = 0; i < raw->poses_count; i++) {
+    snprintf(key, sizeof key, "families.%u.poses.%u", index, i);
+    out->poses++;
+    EP_TRY(file(r, key, raw->poses[i], &out->pose[i]));
+  }
+  if (!raw->map) return EP_OK;
+  out->accept = raw->map->accept && *raw->map->accept;
+  snprintf(key, sizeof key, "families.%u.map.regions", index);
+  return raw->map->regions ? file(r, key, raw->map->regions, &out->regions) : EP_OK;
+}
+
+static ep_status read_families(const reader *r, const raw_scene *raw, ep_scene *out) {
+  if (!raw->families_count) return EP_OK;
+  out->family = calloc(raw->families_count, sizeof *out->family);
+  if (!out->family) return no_memory(r);
+  for (unsigned i = 0; i < raw->families_count; i++) {
+    out->nfamilies++;
+    EP_TRY(read_family(r, i, &raw->families[i], &out->family[i]));
+    for (unsigned j = 0; j < i; j++)
+      if (strcmp(out->family[i].name, out->family[j].name) == 0) {
+        char key[64];
+        snprintf(key, sizeof key, "families.%u.name", i);
+        return bad(r, key, "another family is called '%s' too", out->family[i].name);
+      }
+  }
+  return EP_OK;
+}
+
+static ep_status read_reduction(const reader *r, const raw_reduction *given, ep_scene *out) {
+  const raw_reduction none = {0}, *raw = given ? given : &none;
+  const struct {
+    const char *key;
+    const double *value;
+    int fallback, low, high, *out;
+  } wholes[] = {
+      {"eigenfunctions", raw->eigenfunctions, 10, 1, 200, &out->eigenfunctions},
+      {"modes", raw->modes, 30, 1, 200, &out->modes},
+      {"linear_modes", raw->linear_modes, 15, 1, 100, &out->linear_modes},
+      {"path_samples", raw->path_samples, 4, 0, 32, &out->path_samples},
+      {"elements", raw->elements, 60, 1, 10000, &out->elements},
+      {"training_poses", raw->training_poses, 200, 10, 10000, &out->training_poses},
+  };
+  for (size_t i = 0; i < sizeof wholes / sizeof *wholes; i++) {
+    char key[64];
+    snprintf(key, sizeof key, "reduction.%s", wholes[i].key);
+    EP_TRY(whole(r, key, wholes[i].value, wholes[i].fallback, wholes[i].low, wholes[i].high,
+                 wholes[i].out));
+  }
+  EP_TRY(number(r, "reduction.amplitude", raw->amplitude, 0.2, 1e-4, 2, &out->amplitude));
+  const int examples = ep_scene_examples(out);
+  if (examples > out->modes)
+    return bad(r, "reduction.modes", "%d modes cannot hold %d examples; use at least %d",
+               out->modes, examples, examples);
+  return EP_OK;
+}
+
+static ep_status read_simulation(const reader *r, const raw_simulation *given, ep_scene *out) {
+  const raw_simulation none = {0}, *raw = given ? given : &none;
+  const raw_damping undamped = {0}, *damping = raw->damping ? raw->damping : &undamped;
+  EP_TRY(number(r, "simulation.dt", raw->dt, 1.0 / 60, 1e-6, 1, &out->dt));
+  EP_TRY(whole(r, "simulation.steps", raw->steps, 120, 1, 1000000, &out->steps));
+  EP_TRY(number(r, "simulation.damping.mass", damping->mass, 0.1, 0, 1e6, &out->damping_mass));
+  return number(r, "simulation.damping.stiffness", damping->stiffness, 0.01, 0, 1e3,
+                &out->damping_stiffness);
+}
+
+static ep_status read_push(const reader *r, const char *key, const raw_push *raw, ep_load *out) {
+  char part[96];
+  EP_TRY(selection(r, key, raw->box, raw->plane, raw->file, &out->where));
+  snprintf(part, sizeof part, "%s.force", key);
+  EP_TRY(vector(r, part, raw->force, out->vector));
+  snprintf(part, sizeof part, "%s.from", key);
+  EP_TRY(number(r, part, raw->from, 0, 0, 1e9, &out->from));
+  snprintf(part, sizeof part, "%s.until", key);
+  EP_TRY(number(r, part, raw->until, 1e9, 0, 1e9, &out->until));
+  if (out->until <= out->from)
+    return bad(r, part, "the push ends at %g s, before it begins at %g s", out->until, out->from);
+  snprintf(part, sizeof part, "%s.ramp", key);
+  EP_TRY(number(r, part, raw->ramp, 0, 0, 1e9, &out->ramp));
+  if (2 * out->ramp > out->until - out->from)
+    return bad(r, part, "rise and fall of %g s each do not fit between %g and %g s", out->ramp,
+               out->from, out->until);
+  return EP_OK;
+}
+
+static ep_status read_loads(const reader *r, const raw_scene *raw, ep_scene *out) {
+  if (!raw->loads_count) return EP_OK;
+  out->load = calloc(raw->loads_count, sizeof *out->load);
+  if (!out->load) return no_memory(r);
+  for (unsigned i = 0; i < raw->loads_count; i++) {
+    const raw_load *given = &raw->loads[i];
+    ep_load *load = &out->load[i];
+    char key[64];
+    snprintf(key, sizeof key, "loads.%u", i);
+    out->nloads++;
+    if ((given->gravity != NULL) == (given->push != NULL))
+      return bad(r, key, "give one of gravity, push");
+    load->gravity = given->gravity != NULL;
+    if (load->gravity) {
+      EP_TRY(vector(r, key, given->gravity, load->vector));
+    } else {
+      snprintf(key, sizeof key, "loads.%u.push", i);
+      EP_TRY(read_push(r, key, given->push, load));
+    }
+  }
+  return EP_OK;
+}
+
+static ep_status read_rest(const reader *r, const raw_scene *raw, ep_scene *out) {
+  const raw_examples no_examples = {0};
+  const raw_examples *examples = raw->examples ? raw->examples : &no_examples;
+  EP_TRY(number(r, "examples.strength", examples->strength, 1, 0, 1e4, &out->strength));
+  out->force = examples->force ? (ep_example_force)*examples->force : EP_EXAMPLE_ENERGY;
+  out->solver = examples->solver ? (ep_solver)*examples->solver : EP_SOLVER_NLOPT;
+  const raw_output *output = raw->output;
+  EP_TRY(whole(r, "output.every", output ? output->every : NULL, 2, 1, 1000000, &out->every));
+  out->formats = EP_FORMAT_VTU | EP_FORMAT_GLB | EP_FORMAT_PNG;
+  if (output && output->formats) {
+    out->formats = 0;
+    for (unsigned i = 0; i < output->formats_count; i++)
+      out->formats |= (unsigned)output->formats[i];
+  }
+  return EP_OK;
+}
+
+static ep_status convert(const reader *r, const raw_scene *raw, ep_scene *out) {
+  if (raw->schema != 1)
+    return bad(r, "schema", "%g is not a schema this version reads; it reads schema: 1",
+               raw->schema);
+  char stem[EP_PATH_MAX];
+  EP_TRY(ep_path_stem(r->name, stem, r->err));
+  EP_TRY(copy_text(r, r->name, &out->path));
+  EP_TRY(copy_text(r, raw->name ? raw->name : stem, &out->name));
+  if (strpbrk(out->name, "/\n")) return bad(r, "name", "a name must not contain '/'");
+  int seed = 0;
+  EP_TRY(whole(r, "seed", raw->seed, 1, 0, 2147483647, &seed));
+  out->seed = (uint64_t)seed;
+  EP_TRY(read_object(r, &raw->object, out));
+  EP_TRY(read_fixed(r, raw, out));
+  EP_TRY(read_families(r, raw, out));
+  EP_TRY(read_reduction(r, raw->reduction, out));
+  EP_TRY(read_simulation(r, raw->simulation, out));
+  EP_TRY(read_loads(r, raw, out));
+  return read_rest(r, raw, out);
+}
+
+ep_status ep_scene_parse(const char *path, const char *folder, const char *text, size_t size,
+                         int nsets, const char *const *sets, ep_scene *out, ep_error *err) {
+  memset(out, 0, sizeof *out);
+  if (size > SCENE_BYTES_MAX)
+    return ep_fail(err, EP_ERR_SCENE,
+                   "%s: %zu bytes are too many for a scene; name mesh files "
+                   "in it instead of their content",
+                   path, size);
+  ep_scene_text loaded;
+  EP_TRY(ep_scene_load(path, text, size, nsets, sets, &loaded, err));
+  const reader r = {
+      .loaded = &loaded, .name = path, .folder = folder, .overridden = nsets > 0, .err = err};
+  const ep_status status = convert(&r, loaded.raw, out);
+  ep_scene_unload(&loaded);
+  if (status != EP_OK) ep_scene_free(out);
+  return status;
+}
+
+ep_status ep_scene_read(const char *path, int nsets, const char *const *sets, ep_scene *out,
+                        ep_error *err) {
+  memset(out, 0, sizeof *out);
+  char folder[EP_PATH_MAX], *text;
+  size_t size;
+  EP_TRY(ep_path_folder(path, folder, err));
+  EP_TRY(ep_file_read(path, &text, &size, err));
+  const ep_status status = ep_scene_parse(path, folder, text, size, nsets, sets, out, err);
+  free(text);
+  return status;
+}
+
+void ep_scene_free(ep_scene *scene) {
+  for (int i = 0; i < scene->nfixed; i++) free(scene->fixed[i].path);
+  for (int i = 0; i < scene->nloads; i++) free(scene->load[i].where.path);
+  for (int i = 0; i < scene->nfamilies; i++) {
+    ep_family *family = &scene->family[i];
+    for (int j = 0; j < family->poses; j++) free(family->pose[j]);
+    free(family->pose);
+    free(family->name);
+    free(family->rest);
+    free(family->regions);
+  }
+  free(scene->fixed);
+  free(scene->load);
+  free(scene->family);
+  free(scene->path);
+  free(scene->name);
+  free(scene->mesh);
+  memset(scene, 0, sizeof *scene);
+}
+
+int ep_scene_examples(const ep_scene *scene) {
+  int count = 0;
+  for (int i = 0; i < scene->nfamilies; i++) count += scene->family[i].poses;
+  return count;
+}

@@ -1,0 +1,77 @@
+// The scene, complete: defaults filled in, values checked, paths resolved (docs/scene.md).
+#ifndef EP_APP_SCENE_H
+#define EP_APP_SCENE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "base/error.h"
+#include "mesh/mesh.h"
+#include "reduced/eigenpose.h"
+
+typedef enum ep_solver { EP_SOLVER_NLOPT, EP_SOLVER_NEWTON } ep_solver;
+enum { EP_FORMAT_VTU = 1, EP_FORMAT_GLB = 2, EP_FORMAT_PNG = 4 }; // bits of ep_scene.formats
+
+typedef enum ep_select { EP_SELECT_BOX, EP_SELECT_PLANE, EP_SELECT_FILE } ep_select;
+// Which vertices: inside a closed box, behind or on a plane, or listed in a file.
+typedef struct ep_selection {
+  ep_select kind;
+  double a[3], b[3]; // box: low, high; plane: point, normal
+  char *path;        // file
+  char key[64];      // where it stands in the scene, for messages
+} ep_selection;
+
+typedef struct ep_family {
+  char *name;
+  char *rest; // NULL: poses are of the object's own rest shape
+  int poses;
+  char **pose;   // (poses)
+  char *regions; // NULL: automatic map
+  bool accept;   // go on with a bad map
+} ep_family;
+
+typedef struct ep_load {
+  bool gravity; // acceleration [m/s^2] on everything; else a total force [N] on `where`
+  double vector[3];
+  ep_selection where;
+  double from, until, ramp; // [s]
+} ep_load;
+
+typedef struct ep_scene {
+  char *path, *name;
+  uint64_t seed;
+  char *mesh;
+  ep_material model;
+  bool has_material; // else the mesh file's own constants
+  ep_elastic material;
+  int nfixed;
+  ep_selection *fixed;
+  int nfamilies;
+  ep_family *family;
+  int eigenfunctions, modes, linear_modes, path_samples, elements, training_poses;
+  double amplitude;
+  double dt;
+  int steps;
+  double damping_mass, damping_stiffness;
+  double strength;
+  ep_example_force force;
+  ep_solver solver;
+  int nloads;
+  ep_load *load;
+  int every;
+  unsigned formats;
+} ep_scene;
+
+// Read and check a scene; sets (nsets) are "key=value" overrides, checked like the file itself.
+// Errors: EP_ERR_IO; EP_ERR_SCENE with file:line:column and the key. Missing mesh, region and
+// vertex files are named here, before any work begins.
+ep_status ep_scene_read(const char *path, int nsets, const char *const *sets, ep_scene *out,
+                        ep_error *err);
+// The same for text in memory; relative paths are looked up in `folder`.
+ep_status ep_scene_parse(const char *path, const char *folder, const char *text, size_t size,
+                         int nsets, const char *const *sets, ep_scene *out, ep_error *err);
+void ep_scene_free(ep_scene *scene);
+
+int ep_scene_examples(const ep_scene *scene); // poses of all families
+
+#endif

@@ -1,0 +1,158 @@
+#include "app/scene_schema.h"
+
+#include "app/scene.h"
+#include "reduced/eigenpose.h"
+
+// NOLINTBEGIN: libcyaml's macros
+#define OPTIONAL             (CYAML_FLAG_POINTER | CYAML_FLAG_OPTIONAL)
+#define NUMBER(type, member) CYAML_FIELD_FLOAT_PTR(#member, OPTIONAL, type, member)
+#define TEXT(type, member)                                                                         \
+  CYAML_FIELD_STRING_PTR(#member, OPTIONAL, type, member, 1, CYAML_UNLIMITED)
+#define PART(type, member, fields) CYAML_FIELD_MAPPING_PTR(#member, OPTIONAL, type, member, fields)
+#define VECTOR(type, member)                                                                       \
+  CYAML_FIELD_SEQUENCE_FIXED(#member, CYAML_FLAG_DEFAULT, type, member, &number, 3)
+
+static const cyaml_schema_value_t number = {CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)};
+static const cyaml_schema_value_t text = {
+    CYAML_VALUE_STRING(CYAML_FLAG_POINTER, char *, 1, CYAML_UNLIMITED)};
+
+static const cyaml_strval_t material_names[] = {
+    {"stvk", EP_STVK},
+    {"stvk-volume", EP_STVK_VOLUME},
+    {"neohookean", EP_STABLE_NEOHOOKEAN},
+    {"corotational", EP_COROTATIONAL},
+};
+static const cyaml_strval_t force_names[] = {
+    {"energy", EP_EXAMPLE_ENERGY},
+    {"linear", EP_EXAMPLE_LINEAR},
+};
+static const cyaml_strval_t solver_names[] = {
+    {"nlopt", EP_SOLVER_NLOPT},
+    {"newton", EP_SOLVER_NEWTON},
+};
+static const cyaml_strval_t format_names[] = {
+    {"vtu", EP_FORMAT_VTU},
+    {"glb", EP_FORMAT_GLB},
+    {"png", EP_FORMAT_PNG},
+};
+
+static const cyaml_schema_field_t box_fields[] = {
+    VECTOR(raw_box, low),
+    VECTOR(raw_box, high),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_field_t plane_fields[] = {
+    VECTOR(raw_plane, point),
+    VECTOR(raw_plane, normal),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_field_t selection_fields[] = {
+    PART(raw_selection, box, box_fields),
+    PART(raw_selection, plane, plane_fields),
+    TEXT(raw_selection, file),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_value_t selection = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, raw_selection, selection_fields)};
+
+static const cyaml_schema_field_t material_fields[] = {
+    CYAML_FIELD_ENUM_PTR("model", OPTIONAL | CYAML_FLAG_STRICT, raw_material, model, material_names,
+                         CYAML_ARRAY_LEN(material_names)),
+    NUMBER(raw_material, density),
+    NUMBER(raw_material, young),
+    NUMBER(raw_material, poisson),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_field_t object_fields[] = {
+    CYAML_FIELD_STRING_PTR("mesh", CYAML_FLAG_POINTER, raw_object, mesh, 1, CYAML_UNLIMITED),
+    PART(raw_object, material, material_fields),
+    CYAML_FIELD_END,
+};
+
+static const cyaml_schema_field_t map_fields[] = {
+    TEXT(raw_map, regions),
+    CYAML_FIELD_BOOL_PTR("accept", OPTIONAL, raw_map, accept),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_field_t family_fields[] = {
+    TEXT(raw_family, name),
+    TEXT(raw_family, rest),
+    CYAML_FIELD_SEQUENCE("poses", CYAML_FLAG_POINTER, raw_family, poses, &text, 1, 64),
+    PART(raw_family, map, map_fields),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_value_t family = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, raw_family, family_fields)};
+
+static const cyaml_schema_field_t reduction_fields[] = {
+    NUMBER(raw_reduction, eigenfunctions), NUMBER(raw_reduction, modes),
+    NUMBER(raw_reduction, linear_modes),   NUMBER(raw_reduction, path_samples),
+    NUMBER(raw_reduction, elements),       NUMBER(raw_reduction, training_poses),
+    NUMBER(raw_reduction, amplitude),      CYAML_FIELD_END,
+};
+
+static const cyaml_schema_field_t damping_fields[] = {
+    NUMBER(raw_damping, mass),
+    NUMBER(raw_damping, stiffness),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_field_t simulation_fields[] = {
+    NUMBER(raw_simulation, dt),
+    NUMBER(raw_simulation, steps),
+    PART(raw_simulation, damping, damping_fields),
+    CYAML_FIELD_END,
+};
+
+static const cyaml_schema_field_t examples_fields[] = {
+    NUMBER(raw_examples, strength),
+    CYAML_FIELD_ENUM_PTR("force", OPTIONAL | CYAML_FLAG_STRICT, raw_examples, force, force_names,
+                         CYAML_ARRAY_LEN(force_names)),
+    CYAML_FIELD_ENUM_PTR("solver", OPTIONAL | CYAML_FLAG_STRICT, raw_examples, solver, solver_names,
+                         CYAML_ARRAY_LEN(solver_names)),
+    CYAML_FIELD_END,
+};
+
+static const cyaml_schema_field_t push_fields[] = {
+    PART(raw_push, box, box_fields),
+    PART(raw_push, plane, plane_fields),
+    TEXT(raw_push, file),
+    VECTOR(raw_push, force),
+    NUMBER(raw_push, from),
+    NUMBER(raw_push, until),
+    NUMBER(raw_push, ramp),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_field_t load_fields[] = {
+    CYAML_FIELD_SEQUENCE("gravity", OPTIONAL, raw_load, gravity, &number, 3, 3),
+    PART(raw_load, push, push_fields),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_value_t load = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, raw_load, load_fields)};
+
+static const cyaml_schema_value_t format = {
+    CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, format_names, CYAML_ARRAY_LEN(format_names))};
+static const cyaml_schema_field_t output_fields[] = {
+    NUMBER(raw_output, every),
+    CYAML_FIELD_SEQUENCE("formats", OPTIONAL, raw_output, formats, &format, 0, 8),
+    CYAML_FIELD_END,
+};
+
+static const cyaml_schema_field_t scene_fields[] = {
+    CYAML_FIELD_FLOAT("schema", CYAML_FLAG_DEFAULT, raw_scene, schema),
+    TEXT(raw_scene, name),
+    NUMBER(raw_scene, seed),
+    CYAML_FIELD_MAPPING("object", CYAML_FLAG_DEFAULT, raw_scene, object, object_fields),
+    CYAML_FIELD_SEQUENCE("fixed", OPTIONAL, raw_scene, fixed, &selection, 0, 256),
+    CYAML_FIELD_SEQUENCE("families", OPTIONAL, raw_scene, families, &family, 0, 64),
+    PART(raw_scene, reduction, reduction_fields),
+    PART(raw_scene, simulation, simulation_fields),
+    PART(raw_scene, examples, examples_fields),
+    CYAML_FIELD_SEQUENCE("loads", OPTIONAL, raw_scene, loads, &load, 0, 256),
+    PART(raw_scene, output, output_fields),
+    CYAML_FIELD_END,
+};
+// NOLINTEND
+
+const cyaml_schema_value_t ep_scene_schema = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_POINTER, raw_scene, scene_fields)};

@@ -1,0 +1,90 @@
+// The scene as it stands in the file, before defaults and checks (docs/scene.md). Optional values
+// are pointers, NULL where left out. Whole numbers are read as doubles, so that 1.5 modes can be
+// refused instead of cut.
+#ifndef EP_APP_SCENE_SCHEMA_H
+#define EP_APP_SCENE_SCHEMA_H
+
+#include <cyaml/cyaml.h>
+#include <stdbool.h>
+
+typedef struct raw_box {
+  double low[3], high[3];
+} raw_box;
+typedef struct raw_plane {
+  double point[3], normal[3];
+} raw_plane;
+typedef struct raw_selection {
+  raw_box *box;
+  raw_plane *plane;
+  char *file;
+} raw_selection;
+typedef struct raw_material {
+  int *model;
+  double *density, *young, *poisson;
+} raw_material;
+typedef struct raw_object {
+  char *mesh;
+  raw_material *material;
+} raw_object;
+typedef struct raw_map {
+  char *regions;
+  bool *accept;
+} raw_map;
+typedef struct raw_family {
+  char *name, *rest;
+  char **poses;
+  unsigned poses_count;
+  raw_map *map;
+} raw_family;
+typedef struct raw_reduction {
+  double *eigenfunctions, *modes, *linear_modes, *path_samples, *elements, *training_poses;
+  double *amplitude;
+} raw_reduction;
+typedef struct raw_damping {
+  double *mass, *stiffness;
+} raw_damping;
+typedef struct raw_simulation {
+  double *dt, *steps;
+  raw_damping *damping;
+} raw_simulation;
+typedef struct raw_examples {
+  double *strength;
+  int *force, *solver;
+} raw_examples;
+typedef struct raw_push {
+  raw_box *box;
+  raw_plane *plane;
+  char *file;
+  double force[3];
+  double *from, *until, *ramp;
+} raw_push;
+typedef struct raw_load {
+  double *gravity; // 3
+  unsigned gravity_count;
+  raw_push *push;
+} raw_load;
+typedef struct raw_output {
+  double *every;
+  int *formats;
+  unsigned formats_count;
+} raw_output;
+typedef struct raw_scene {
+  double schema;
+  char *name;
+  double *seed;
+  raw_object object;
+  raw_selection *fixed;
+  unsigned fixed_count;
+  raw_family *families;
+  unsigned families_count;
+  raw_reduction *reduction;
+  raw_simulation *simulation;
+  raw_examples *examples;
+  raw_load *loads;
+  unsigned loads_count;
+  raw_output *output;
+} raw_scene;
+
+extern const cyaml_schema_value_t ep_scene_schema;
+
+#endif

@@ -1,0 +1,37 @@
+// The simulation of a run: loads, steps, what is recorded.
+#ifndef EP_APP_SIMULATE_H
+#define EP_APP_SIMULATE_H
+
+#include "app/model_file.h"
+#include "app/shapes.h"
+
+typedef struct ep_record {
+  int rows;          // steps done + 1 (row 0 is rest)
+  double *time;      // (rows) [s]
+  double *q;         // (rows x r)
+  double *weights;   // (rows x (k + 1)), the rest shape's first; NULL without examples
+  double *step_ms;   // (rows - 1) wall time of each step, interpolation included
+  double *target_ms; // (rows - 1) of the interpolation alone
+  int max_inverted;  // most inverted tets after any step
+  int halvings;      // steps that had to be halved
+  int newton_iterations, target_evaluations; // over the run
+} ep_record;
+
+// Simulate scene->steps steps. What was done before a failure stays in the record.
+// Errors: EP_ERR_NUMERIC where a step fails even after halving, with its number; those of
+// selections.
+ep_status ep_simulate(const ep_scene *scene, const ep_shapes *shapes, const ep_model *model,
+                      ep_log *log, ep_record *out, ep_error *err);
+void ep_record_free(ep_record *record);
+
+// Median of count values; 0 for none.
+double ep_median(int count, const double *value);
+
+// How far shape q has gone from rest towards an example, <u, u_ex>_M / <u_ex, u_ex>_M. The modes
+// are mass-orthonormal, so this is q . q_ex / |q_ex|^2.
+double ep_example_fraction(const ep_model *model, const double *q, int example);
+
+// Strength of a push at time t: 0 outside from..until, linear rise and fall over `ramp`.
+double ep_load_profile(const ep_load *load, double t);
+
+#endif
