@@ -86,21 +86,27 @@ static ep_status seat_on_held(const ep_mesh *mesh, const unsigned char *held, do
   return EP_OK;
 }
 
-// From the seated free pose to one that rests at the held vertices; target (m x 3) receives the
-// coefficients of the seated pose, which are those aimed at.
+// From the seated free pose to one that rests at the held vertices; seated (m x 3) receives the
+// coefficients of the former. What is aimed at are the coefficients of the seated pose *without*
+// its held vertices: how far those were from rest is nothing the rest of the object should make up
+// for (it would be torn: a bar held over half its length got inverted tets).
 static ep_status held_pose(const ep_mesh *mesh, const ep_lb *lb, const ep_pose_options *o,
-                           double *u, double *target, ep_pose_report *report, ep_error *err) {
+                           double *u, double *seated, ep_pose_report *report, ep_error *err) {
   ep_pose_solver s;
   int iterations = 0;
+  double *target = malloc(3 * (size_t)o->m * sizeof *target);
+  if (!target) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d coefficients", o->m);
   ep_status status = ep_pose_solver_make(mesh, lb, o->m, o->held, &s, err);
   if (status == EP_OK) {
-    ep_pose_coefficients(&s, u, target);
+    ep_pose_coefficients(&s, u, seated);
     for (int i = 0; i < mesh->nv; i++)
       if (o->held[i]) u[3 * i] = u[3 * i + 1] = u[3 * i + 2] = 0;
+    ep_pose_coefficients(&s, u, target);
     status = alternate(&s, target, o, u, &iterations, err);
     report->iterations += iterations;
   }
   ep_pose_solver_free(&s);
+  free(target);
   return status;
 }
 
