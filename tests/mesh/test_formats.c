@@ -308,14 +308,42 @@ static void vtk_in_all_encodings(void **state) {
   }
 }
 
-// Numbers are read with a point, also where the user's language writes a comma.
+// Text files from Windows: a byte order mark and \r\n.
+static void windows_texts_are_read(void **state) {
+  (void)state;
+  const ep_mesh_format formats[] = {EP_MESH_VEG, EP_MESH_MSH, EP_MESH_MSH, EP_MESH_VTK,
+                                    EP_MESH_VTK};
+  for (int i = 0; i < 5; i++) {
+    bytes plain = {0}, b = {0};
+    if (i == 0) put_veg(&plain, 1, 1);
+    if (i == 1) put_gmsh_2(&plain, false);
+    if (i == 2) put_gmsh_4(&plain, false);
+    if (i == 3) put_vtk_4(&plain, false, false);
+    if (i == 4) put_vtk_5(&plain, false, true);
+    put(&b, "\xEF\xBB\xBF");
+    for (size_t k = 0; k < plain.size; k++) {
+      if (plain.data[k] == '\n') put(&b, "\r");
+      put_raw(&b, plain.data + k, 1);
+    }
+    expect_cube(formats[i], &b, i > 0);
+  }
+}
+
+// A locale with a decimal comma: an installed one, or one made here where its sources are.
+static bool enter_comma_locale(void) {
+  static const char make[] = "mkdir -p locale && test -d locale/de_DE.UTF-8 || localedef -i de_DE "
+                             "-f UTF-8 ./locale/de_DE.UTF-8 >/dev/null 2>&1";
+  if (setlocale(LC_ALL, "de_DE.UTF-8")) return true;
+  if (system(make) != 0) return false;
+  setenv("LOCPATH", "locale", 1);
+  return setlocale(LC_ALL, "de_DE.UTF-8") != NULL;
+}
+
+// Numbers are read and written with a point, also where the user's language has a comma.
 static void locale_does_not_matter(void **state) {
   (void)state;
-  const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "de_DE"};
-  bool found = false;
-  for (int i = 0; i < 4 && !found; i++) found = setlocale(LC_ALL, names[i]) != NULL;
-  if (!found) {
-    print_message("skipped: no locale with a decimal comma is installed\n");
+  if (!enter_comma_locale()) {
+    print_message("skipped: no locale with a decimal comma can be had\n");
     skip();
   }
   bytes b = {0};
@@ -338,7 +366,8 @@ int main(void) {
       cmocka_unit_test(veg_in_both_bases),        cmocka_unit_test(veg_materials_by_region),
       cmocka_unit_test(veg_includes_other_files), cmocka_unit_test(tetgen_in_both_bases),
       cmocka_unit_test(medit_in_both_bases),      cmocka_unit_test(gmsh_in_all_encodings),
-      cmocka_unit_test(vtk_in_all_encodings),     cmocka_unit_test(locale_does_not_matter),
+      cmocka_unit_test(vtk_in_all_encodings),     cmocka_unit_test(windows_texts_are_read),
+      cmocka_unit_test(locale_does_not_matter),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
