@@ -311,7 +311,6 @@ void ep_material_project(double h[81]) {
 }
 
 const char *ep_material_name(ep_material model) {
-  static const char *const name[EP_MATERIALS] = {"stvk", "stvk-volume", "neohookean",
-                                                 "corotational"};
+  static const char name[EP_MATERIALS][16] = {"stvk", "stvk-volume", "neohookean", "corotational"};
   return (int)model >= 0 && (int)model < EP_MATERIALS ? name[model] : NULL;
 }

@@ -131,7 +131,7 @@ typedef struct entry {
 } entry;
 
 static const struct {
-  const char *name;
+  char name[4]; // an array, not a pointer: constant data without relocations
   int size;
 } dtypes[EP_DTYPES] = {{"F64", 8}, {"F32", 4}, {"I32", 4}, {"I64", 8}, {"U8", 1}};
 

@@ -22,8 +22,10 @@ static const double *descriptor_of(const ep_model *m, int i) {
   return i == 0 ? m->c0 : m->example_c + (size_t)(i - 1) * 3 * (size_t)m->size.m;
 }
 
-static void fill_gram(const ep_model *m, const double *c, polytope *p) {
+// 0 where a descriptor is not finite.
+static int fill_gram(const ep_model *m, const double *c, polytope *p) {
   const int length = 3 * m->size.m;
+  double trace = 0;
   p->scale = 0;
   for (int i = 0; i < p->count; i++) {
     const double *a = descriptor_of(m, i);
@@ -34,7 +36,9 @@ static void fill_gram(const ep_model *m, const double *c, polytope *p) {
       p->gram[i * p->count + j] = p->gram[j * p->count + i] = sum;
     }
     p->scale = fmax(p->scale, p->gram[i * p->count + i]);
+    trace += p->gram[i * p->count + i]; // fmax would pass over a NaN
   }
+  return isfinite(trace);
 }
 
 // Minimiser over the affine hull of the corral: (G + scale 1 1^T) u = 1, v = u / sum u (the added
@@ -127,7 +131,6 @@ ep_status ep_example_weights(ep_state *state, const double *c, double *w) {
                 .factor = state->corral,
                 .v = state->small,
                 .gradient = state->small + count};
-  fill_gram(m, c, &p);
-  if (!isfinite(p.scale)) return EP_ERR_NUMERIC;
+  if (!fill_gram(m, c, &p)) return EP_ERR_NUMERIC;
   return nearest_point(&p);
 }
