@@ -37,7 +37,7 @@ typedef enum ep_verdict { EP_MAP_GOOD, EP_MAP_DOUBTFUL, EP_MAP_BAD } ep_verdict;
 typedef struct ep_region_quality {
   double residual_before, residual_after; // coupling residual of the region's function, relative
   double jaccard;                         // of the mapped region with the given one, by volume
-  int best_match;                         // region of the example that fits best
+  int best_match;                         // region of the example that fits clearly best
   bool suspect;                           // best_match differs, or the robust weight gave it up
 } ep_region_quality;
 

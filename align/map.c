@@ -154,9 +154,9 @@ static ep_status drop_suspects(job *j, const trial *t, int *dropped, ep_error *e
                          : ep_fail(err, EP_ERR_MEMORY, "no memory for %d regions", count);
   int out = 0, fresh = 0;
   if (status == EP_OK) {
-    ep_region_suspects(count, overlap, suspect, best);
+    ep_region_suspects(count, overlap, j->use, suspect, best);
     for (int g = 0; g < count; g++) {
-      out += suspect[g] || !j->use[g];
+      out += suspect[g];
       fresh += suspect[g] && j->use[g];
     }
     *dropped = 2 * out < count ? fresh : 0;

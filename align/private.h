@@ -2,6 +2,8 @@
 #ifndef EP_ALIGN_PRIVATE_H
 #define EP_ALIGN_PRIVATE_H
 
+#include <stddef.h>
+
 #include "align/align.h"
 
 // ---- neighbours.c: exact nearest neighbours by a tree of tight bounding boxes.
@@ -97,8 +99,11 @@ ep_status ep_couple_descend(const ep_couple_problem *problem, int iterations, do
 // over that of the union. out (regions x regions), row g.
 ep_status ep_region_overlap(const ep_side *from, const ep_side *to, const int *p, double *out,
                             ep_error *err);
-// Regions a map contradicts: another region fits clearly better. suspect, best (regions) out.
-void ep_region_suspects(int regions, const double *overlap, unsigned char *suspect, int *best);
+// Regions a map contradicts (another fits clearly better) and those left out already (use NULL or
+// (regions)). suspect, best (regions) out: best is the own partner unless another is clearly
+// better.
+void ep_region_suspects(int regions, const double *overlap, const unsigned char *use,
+                        unsigned char *suspect, int *best);
 // Fill map->quality (cycle, frame, rounds given by the caller) and the verdict. use (regions) says
 // which regions took part; dropped ones are recorded as suspect.
 ep_status ep_map_judge(const ep_side *from, const ep_side *to, const unsigned char *use,

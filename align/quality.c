@@ -9,11 +9,12 @@
 // Thresholds of the verdict. Round trip: measured over eleven pairs, good maps <= .22, the one
 // failure .60 (DESIGN "Maps"); Jaccard: usable maps had .64 and more, failed ones .37-.43 (same
 // place). Coverage: own choice, a map that leaves a third of the example out misses a limb. Frame:
-// tilts of 60 degrees are nearly always repaired, 90 rarely. All from few data.
+// tilts of 40 degrees are always repaired, 60 nearly always, 90 rarely: a larger turn may be wrong.
+// All from few data.
 static const double CYCLE_DOUBTFUL = 0.3, CYCLE_BAD = 0.6;
 static const double JACCARD_DOUBTFUL = 0.5, JACCARD_BAD = 0.3;
 static const double COVERAGE_DOUBTFUL = 0.65, COVERAGE_BAD = 0.3;
-static const double FRAME_DOUBTFUL = 60;
+static const double FRAME_DOUBTFUL = 45;
 // A region is suspect where another fits by so much better, and its own partner hardly.
 static const double SUSPECT_MARGIN = 0.15, SUSPECT_JACCARD = 0.5, SUSPECT_WEIGHT = 0.1;
 // Neighbouring eigenvalues closer than this (relative) may swap or mix between shapes.
@@ -42,13 +43,27 @@ ep_status ep_region_overlap(const ep_side *from, const ep_side *to, const int *p
   return EP_OK;
 }
 
-void ep_region_suspects(int regions, const double *overlap, unsigned char *suspect, int *best) {
+static int best_of(int regions, const double *row, const unsigned char *among) {
+  int best = -1;
+  for (int h = 0; h < regions; h++)
+    if ((!among || among[h]) && (best < 0 || row[h] > row[best])) best = h;
+  return best;
+}
+
+void ep_region_suspects(int regions, const double *overlap, const unsigned char *use,
+                        unsigned char *suspect, int *best) {
   for (int g = 0; g < regions; g++) {
     const double *row = overlap + (size_t)g * regions;
-    best[g] = g;
-    for (int h = 0; h < regions; h++)
-      if (row[h] > row[best[g]]) best[g] = h;
-    suspect[g] = row[g] < SUSPECT_JACCARD && row[best[g]] > row[g] + SUSPECT_MARGIN;
+    best[g] = best_of(regions, row, NULL);
+    if (row[best[g]] <= row[g] + SUSPECT_MARGIN) best[g] = g;
+    suspect[g] = (use && !use[g]) || (best[g] != g && row[g] < SUSPECT_JACCARD);
+  }
+  // Regions overlap: a misplaced one may fit the partner of another region best. Swapped partners
+  // are found among the misplaced ones.
+  for (int g = 0; g < regions; g++) {
+    const double *row = overlap + (size_t)g * regions;
+    const int swapped = suspect[g] ? best_of(regions, row, suspect) : g;
+    if (row[swapped] > SUSPECT_JACCARD) best[g] = swapped;
   }
 }
 
@@ -273,12 +288,12 @@ static ep_status judge_regions(const ep_side *from, const ep_side *to, const uns
     status = ep_fail(err, EP_ERR_MEMORY, "no memory for %d regions", count);
   if (status == EP_OK) status = ep_region_overlap(from, to, map->p, overlap, err);
   if (status == EP_OK) {
-    ep_region_suspects(count, overlap, suspect, best);
+    ep_region_suspects(count, overlap, use, suspect, best);
     for (int g = 0; g < count; g++) {
       ep_region_quality *r = &map->quality.region[g];
       r->jaccard = overlap[g * count + g];
       r->best_match = best[g];
-      r->suspect = suspect[g] || !use[g];
+      r->suspect = suspect[g];
     }
     status = couple_regions(from, to, map, err);
   }

@@ -84,7 +84,7 @@ void place_club(const double u[3], double x[3]) {
 
 void place_bent_club(const double u[3], double x[3]) {
   place_club(u, x);
-  const double t = fmin(fmax((u[0] - 0.3) / 0.4, 0), 1), angle = acos(-1) / 3 * t * t * (3 - 2 * t);
+  const double t = fmin(fmax((u[0] - 0.3) / 0.4, 0), 1), angle = acos(-1) / 2 * t * t * (3 - 2 * t);
   const double dx = x[0] - 2, dy = x[1];
   x[0] = 2 + cos(angle) * dx - sin(angle) * dy;
   x[1] = sin(angle) * dx + cos(angle) * dy;

@@ -2,6 +2,8 @@
 #ifndef EP_TESTS_ALIGN_SHAPES_H
 #define EP_TESTS_ALIGN_SHAPES_H
 
+#include <stddef.h>
+
 #include "align/align.h"
 
 typedef struct test_shape {
@@ -24,7 +26,7 @@ typedef void (*placement)(const double u[3], double x[3]);
 void lattice(const int cells[3], placement place, ep_mesh *mesh, double **u);
 // A bar with a bulge at one end and a bow, so that no symmetry is left.
 void place_club(const double u[3], double x[3]);
-// The same with its far half turned by 60 degrees.
+// The same with its far half turned by 90 degrees.
 void place_bent_club(const double u[3], double x[3]);
 // x <- scale R x + shift, R about an axis.
 void move_mesh(ep_mesh *mesh, const double axis[3], double degrees, double scale, double shift);
