@@ -1,4 +1,8 @@
-// Sparse Cholesky and LDL^T factors.
+// Sparse Cholesky and LDL^T factors by MUMPS, LDL^T with pivoting in both cases: it runs on any
+// number of ranks, and its count of negative pivots tells a matrix that is not positive definite.
+// CHOLMOD through PETSc is two to four times faster on one rank (letter C, 21,210 unknowns: numeric
+// factor .16-.35 s against .7 s, three columns 25 ms against 71), but through PETSc's interface a
+// supernodal refactorisation of an indefinite matrix was accepted without a word.
 #include "linalg/petsc.h"
 
 #include <petscmat.h>
