@@ -55,17 +55,16 @@ static void gradients_reproduce_linear_functions(void **state) {
   ep_mesh_free(&m);
 }
 
-// V = 1/3 int x.n dA holds only if every triangle points outward.
-static void surface_points_outward_and_is_closed(void **state) {
-  (void)state;
-  ep_mesh m = make_cube(NULL);
+// V = 1/3 int x.n dA and int n dA = 0 hold only if every triangle points outward.
+static void expect_outward_surface(const ep_mesh *m, int triangles) {
   ep_error err = {0};
   int count, *t;
-  assert_ok(ep_mesh_surface(&m, &count, &t, &err), &err);
-  assert_int_equal(count, 12);
+  assert_ok(ep_mesh_surface(m, &count, &t, &err), &err);
+  assert_int_equal(count, triangles);
   double volume = 0, area[3] = {0};
   for (int i = 0; i < count; i++) {
-    const double *a = m.x + 3 * t[3 * i], *b = m.x + 3 * t[3 * i + 1], *c = m.x + 3 * t[3 * i + 2];
+    const double *a = m->x + 3 * t[3 * i], *b = m->x + 3 * t[3 * i + 1];
+    const double *c = m->x + 3 * t[3 * i + 2];
     for (int k = 0; k < 3; k++) {
       const int p = (k + 1) % 3, q = (k + 2) % 3;
       const double n = ((b[p] - a[p]) * (c[q] - a[q]) - (b[q] - a[q]) * (c[p] - a[p])) / 2;
@@ -73,10 +72,23 @@ static void surface_points_outward_and_is_closed(void **state) {
       volume += n * (a[k] + b[k] + c[k]) / 9;
     }
   }
-  assert_float_equal(volume, 1, round_off);
+  assert_float_equal(volume, ep_mesh_volume(m), round_off);
   for (int k = 0; k < 3; k++) assert_float_equal(area[k], 0, round_off);
   free(t);
-  ep_mesh_free(&m);
+}
+
+static void surface_points_outward_and_is_closed(void **state) {
+  (void)state;
+  ep_mesh cube = make_cube(NULL), one;
+  expect_outward_surface(&cube, 12);
+  ep_mesh_free(&cube);
+  // All four faces of a tet lie on the surface; in the cube only two kinds of them do.
+  const double x[] = {0.1, 0, 0, 1, 0.2, 0, 0, 1.3, 0, 0.2, 0.1, 0.7};
+  const int tet[] = {0, 1, 2, 3};
+  ep_error err = {0};
+  assert_ok(ep_mesh_make(4, x, 1, tet, "one", &one, NULL, &err), &err);
+  expect_outward_surface(&one, 4);
+  ep_mesh_free(&one);
 }
 
 static void inverted_tets_are_turned_round(void **state) {
