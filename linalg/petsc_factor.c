@@ -41,6 +41,8 @@ static PetscErrorCode analyse(ep_factor *f, const ep_csr *a) {
   PetscCall(MatGetOrdering(f->matrix, MATORDERINGEXTERNAL, &rows, &columns));
   PetscCall(MatFactorInfoInitialize(&info));
   PetscCall(MatCholeskyFactorSymbolic(f->factor, f->matrix, rows, &info));
+  // Detect null pivots: a singular matrix must not pass for a definite one by a pivot of +1e-17.
+  PetscCall(MatMumpsSetIcntl(f->factor, 24, 1));
   PetscCall(ISDestroy(&rows));
   PetscCall(ISDestroy(&columns));
   PetscFunctionReturn(0);
@@ -52,6 +54,9 @@ static PetscErrorCode factorise(ep_factor *f, int *negative, int *broken) {
   PetscCall(MatFactorInfoInitialize(&info));
   PetscCall(MatCholeskyFactorNumeric(f->factor, f->matrix, &info));
   PetscCall(ep_petsc_inertia(f->factor, negative, broken));
+  PetscInt null_pivots = 0;
+  if (!*broken) PetscCall(MatMumpsGetInfog(f->factor, 28, &null_pivots));
+  *broken |= null_pivots > 0;
   PetscFunctionReturn(0);
 }
 

@@ -156,6 +156,23 @@ static void test_indefinite_is_refused(void **state) {
   grid_free(&g);
 }
 
+// A Laplacian with nothing held: constants are its null space. Neither kind of factor takes it.
+static void test_singular_is_refused(void **state) {
+  (void)state;
+  for (int cells = 2; cells <= 6; cells += 2) {
+    grid g = grid_make(cells, cells, cells, 1, 1, 1);
+    ep_csr a = laplacian(&g, 1, 0);
+    for (int definite = 0; definite < 2; definite++) {
+      ep_factor *f;
+      ep_error err = {0};
+      assert_int_equal(ep_factor_create(&a, NULL, definite, &f, &err), EP_ERR_NUMERIC);
+      assert_null(f);
+    }
+    ep_csr_free(&a);
+    grid_free(&g);
+  }
+}
+
 // A failed update makes the factor unusable; the next good one mends it.
 static void test_update_recovers(void **state) {
   (void)state;
@@ -269,9 +286,9 @@ static void test_too_many_pairs(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_solve_and_update),      cmocka_unit_test(test_held_unknowns),
-      cmocka_unit_test(test_indefinite_is_refused), cmocka_unit_test(test_update_recovers),
-      cmocka_unit_test(test_multiple_eigenvalues),  cmocka_unit_test(test_pairs_with_held),
-      cmocka_unit_test(test_too_many_pairs),
+      cmocka_unit_test(test_indefinite_is_refused), cmocka_unit_test(test_singular_is_refused),
+      cmocka_unit_test(test_update_recovers),       cmocka_unit_test(test_multiple_eigenvalues),
+      cmocka_unit_test(test_pairs_with_held),       cmocka_unit_test(test_too_many_pairs),
   };
   return cmocka_run_group_tests_name("petsc", tests, session_start, session_stop);
 }
