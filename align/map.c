@@ -211,7 +211,7 @@ static ep_status finish(job *j, trial *t, ep_map *out, ep_error *err) {
   out->quality.cycle = t->cycle;
   out->quality.reframe_rounds = t->rounds;
   out->quality.frame_angle = ep_frame_angle(t->r);
-  return ep_map_judge(&j->from, &j->to, j->use, out, err);
+  return ep_map_judge(&j->from, &j->to, j->use, j->options->same_family, out, err);
 }
 
 static ep_status check_shapes(const ep_shape *from, const ep_shape *to, const ep_map_options *o,

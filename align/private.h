@@ -106,9 +106,10 @@ void ep_region_suspects(int regions, const double *overlap, const unsigned char 
                         unsigned char *suspect, int *best);
 // Fill map->quality (cycle, frame, rounds given by the caller) and the verdict. use (regions) says
 // which regions took part; dropped ones are recorded as suspect.
+// same_family: larger turns of the frame are expected.
 ep_status ep_map_judge(const ep_side *from, const ep_side *to, const unsigned char *use,
-                       ep_map *map, ep_error *err);
+                       bool same_family, ep_map *map, ep_error *err);
 // The same without meshes, from what the record holds: verdict and reasons.
-void ep_map_verdict(ep_map *map);
+void ep_map_verdict(bool same_family, ep_map *map);
 
 #endif

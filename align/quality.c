@@ -14,7 +14,8 @@
 static const double CYCLE_DOUBTFUL = 0.3, CYCLE_BAD = 0.6;
 static const double JACCARD_DOUBTFUL = 0.5, JACCARD_BAD = 0.3;
 static const double COVERAGE_DOUBTFUL = 0.65, COVERAGE_BAD = 0.3;
-static const double FRAME_DOUBTFUL = 45;
+// Poses of one family turn by up to 57 degrees (same place).
+static const double FRAME_DOUBTFUL = 45, FRAME_DOUBTFUL_FAMILY = 60;
 // A region is suspect where another fits by so much better, and its own partner hardly.
 static const double SUSPECT_MARGIN = 0.15, SUSPECT_JACCARD = 0.5, SUSPECT_WEIGHT = 0.1;
 // Neighbouring eigenvalues closer than this (relative) may swap or mix between shapes.
@@ -304,11 +305,11 @@ static ep_status judge_regions(const ep_side *from, const ep_side *to, const uns
 }
 
 ep_status ep_map_judge(const ep_side *from, const ep_side *to, const unsigned char *use,
-                       ep_map *map, ep_error *err) {
+                       bool same_family, ep_map *map, ep_error *err) {
   EP_TRY(judge_basis(from, map, err));
   EP_TRY(judge_points(from, to, map, err));
   if (use) EP_TRY(judge_regions(from, to, use, map, err));
-  ep_map_verdict(map);
+  ep_map_verdict(same_family, map);
   return EP_OK;
 }
 
@@ -325,7 +326,7 @@ static void weigh(ep_map_quality *q, const char *what, double value, double doub
            used ? "; " : "", what, value, high ? "at most" : "at least", doubtful, advice);
 }
 
-void ep_map_verdict(ep_map *map) {
+void ep_map_verdict(bool same_family, ep_map *map) {
   ep_map_quality *q = &map->quality;
   q->verdict = EP_MAP_GOOD;
   q->reasons[0] = '\0';
@@ -333,7 +334,8 @@ void ep_map_verdict(ep_map *map) {
   if (q->cycle >= 0) weigh(q, "round trip", q->cycle, CYCLE_DOUBTFUL, CYCLE_BAD, true, give);
   weigh(q, "covered share", q->coverage, COVERAGE_DOUBTFUL, COVERAGE_BAD, false, give);
   if (!q->regions)
-    weigh(q, "turn of the frame in degrees", q->frame_angle, FRAME_DOUBTFUL, HUGE_VAL, true,
+    weigh(q, "turn of the frame in degrees", q->frame_angle,
+          same_family ? FRAME_DOUBTFUL_FAMILY : FRAME_DOUBTFUL, HUGE_VAL, true,
           "turn the example as the object stands, or give regions");
   double jaccard = 0;
   int used = 0;
