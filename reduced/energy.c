@@ -62,12 +62,17 @@ double ep_target_energy(ep_state *state, const double *w, const double *q, doubl
   return ep_evaluate(state, add_examples(state, w + 1, terms), q, f, h, project);
 }
 
-// F of one element (the scalar form; once per step and element).
-static void element_gradient(const ep_model *m, int e, const double *q, double f[9]) {
-  const double *g = m->cubature_g + (size_t)e * (size_t)m->size.blocks * 72;
+// F of one element, in the layout's own lanes (padded_q holds q and zeros).
+static void element_gradient(const ep_state *state, int e, double f[9]) {
+  const int blocks = state->model->size.blocks;
+  const double *g = state->model->cubature_g + (size_t)e * (size_t)blocks * 72;
   for (int c = 0; c < 9; c++) {
-    f[c] = c % 4 == 0;
-    for (int a = 0; a < m->size.r; a++) f[c] += g[(a / 8 * 9 + c) * 8 + a % 8] * q[a];
+    double sum[EP_LANES] = {0};
+    for (int b = 0; b < blocks; b++)
+      for (int i = 0; i < EP_LANES; i++)
+        sum[i] += g[(9 * b + c) * EP_LANES + i] * state->padded_q[EP_LANES * b + i];
+    f[c] = (c % 4 == 0) +
+           (((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7])));
   }
 }
 
@@ -77,9 +82,10 @@ static const double smallest_target_volume = 0.05;
 
 void ep_freeze_target(ep_state *state) {
   const ep_model *m = state->model;
+  memcpy(state->padded_q, state->next_target, (size_t)m->size.r * sizeof(double));
   for (int e = 0; e < m->size.s; e++) {
     double f[9], *b = state->target_inverse + 9 * e;
-    element_gradient(m, e, state->next_target, f);
+    element_gradient(state, e, f);
     for (int i = 0; i < 3; i++) {
       int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
       for (int j = 0; j < 3; j++) { // transposed cofactors

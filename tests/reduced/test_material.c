@@ -63,7 +63,7 @@ static double tangent_error(ep_material model, const double f[9], const double d
 typedef double (*error_function)(ep_material, const double *, const double *, double);
 
 // Slope of log(error) over log(h) between 2e-2 and 2e-3 (round-off is 1e-13 there, the error
-// 1e-5 and more), as the median-free mean of errors over poses.
+// 1e-5 and more), errors summed over poses.
 static double slope(error_function error, ep_material model) {
   double coarse = 0, fine = 0, f[9], d[9];
   for (int pose = 0; pose < 40; pose++) {
