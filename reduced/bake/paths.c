@@ -11,7 +11,9 @@
 static const double PROXIMAL = 1e-8;  // of the stiffness at rest: see paths.h
 static const double TOLERANCE = 1e-4; // relative Newton decrement; the last step squares it
 static const double ARMIJO = 1e-4;
-enum { ITERATIONS = 60, HALVINGS = 30 };
+// After an indefinite stiffness the exact one is tried again below this relative decrement.
+static const double NEAR = 0.05;
+enum { ITERATIONS = 30, HALVINGS = 30 };
 
 // E = (A + A^T + A^T A) / 2 with A = F - I: no cancellation at small strains.
 static void green_strain(const double a[9], double e[9]) {
@@ -77,8 +79,9 @@ void ep_strain_fit_stiffness(const ep_strain_fit *fit, const double *u, int proj
   for (int e = 0; e < fem->mesh->nt; e++) {
     double f[9], z[9], s[9], h[81];
     element_state(fit, e, u, f, z, s);
+    // Gauss-Newton: without the stress term the tangent is F^T D F, positive semidefinite
+    if (project) memset(s, 0, sizeof s);
     tangent(fem->lambda[e], fem->mu[e], f, s, h);
-    if (project) ep_material_project(h);
     ep_fem_scatter_tangent(fem, e, fem->volume[e], h, k);
   }
 }
@@ -112,11 +115,13 @@ static ep_status factorise(newton *s, const double *u, int project, ep_error *er
   return ep_factor_update(s->factor, s->k, err);
 }
 
-// Newton direction into step: the exact stiffness where it is positive definite, else projected.
+// Newton direction into step: the exact stiffness where it is positive definite, else Gauss-Newton,
+// which is close to it because the strains of a path are nearly compatible (small residual).
 static ep_status direction(newton *s, const double *u, ep_strain_fit_report *report,
                            ep_error *err) {
   ep_error indefinite = {0}; // expected at times: not the caller's concern
-  ep_status status = factorise(s, u, 0, &indefinite);
+  ep_status status = EP_ERR_NUMERIC;
+  if (report->projections == 0 || report->residual < NEAR) status = factorise(s, u, 0, &indefinite);
   if (status == EP_ERR_NUMERIC) {
     report->projections++;
     status = factorise(s, u, 1, err);

@@ -8,7 +8,7 @@
 // The potential minimised at strength w, with D the isotropic elasticity (lambda, mu):
 //   W(u) = sum_e V (lambda/2 tr(Z)^2 + mu Z : Z),  Z = E(u) - w E(P),  E = (F^T F - I) / 2
 // strain (nt x 9) holds E(P). The force g (3n) and the stiffness k (3x3-block pattern) may be NULL.
-// project != 0: element tangents projected to positive semidefinite.
+// project != 0: the Gauss-Newton part only, which is positive semidefinite.
 typedef struct ep_strain_fit {
   const ep_fem *fem;
   const double *strain;
@@ -29,7 +29,7 @@ typedef struct ep_strain_fit_report {
 // 1e-8/2 |u - start|^2_K0 keeps crushed elements from making the system singular.
 //   factor: of a matrix on the mesh's 3x3-block pattern with the held unknowns (only its symbolic
 //   part matters); k0: K(0); k: work matrix on the same pattern.
-// Errors: EP_ERR_NUMERIC where even the projected stiffness has no Cholesky factor.
+// Errors: EP_ERR_NUMERIC where even the Gauss-Newton stiffness has no Cholesky factor.
 ep_status ep_strain_fit_minimise(const ep_strain_fit *fit, ep_factor *factor, const ep_csr *k0,
                                  ep_csr *k, double *u, ep_strain_fit_report *report, ep_error *err);
 
