@@ -23,8 +23,8 @@ typedef struct ep_regions {
   int *vertex; // (start[count * shapes])
 } ep_regions;
 
-// The authors' .ini: number of regions, then for each one line of 1-based file vertices, ended by
-// ';', for the object and one for each example in order. meshes (shapes) in that order.
+// The authors' .ini: number of regions, then for each one line of 1-based file vertices, each
+// followed by ';', for the object and one for each example in order. meshes (shapes) in that order.
 // Errors: EP_ERR_FORMAT with file and line: wrong count, empty region, vertex out of range.
 ep_status ep_regions_read(const char *path, int shapes, const ep_mesh *const *meshes,
                           ep_regions *out, ep_error *err);
@@ -72,13 +72,15 @@ void ep_map_free(ep_map *map);
 
 typedef struct ep_map_options {
   int m;                      // functions of the final map
-  bool same_family;           // rest and pose of one family: high gamma, turned poses expected
+  bool same_family;           // rest and pose of one family: turned poses expected
   const ep_regions *regions;  // NULL: automatic
   int from_column, to_column; // columns of the two shapes in regions
 } ep_map_options;
 ep_map_options ep_default_map_options(void);
 
-// Product-space matching with reframing (DESIGN, measured recipe). Errors: EP_ERR_ARGUMENT (m
+// Product-space matching with reframing (DESIGN, measured recipe). Uses up to 12 functions, between
+// shapes of one family 20 (or m), where the spaces hold them; the coupling residuals up to 2m of
+// `to`: compute spaces of max(20, 2m). Errors: EP_ERR_ARGUMENT (m
 // larger than the spaces), EP_ERR_MATCH (component counts differ). A bad map is no error here: the
 // verdict says so, the caller decides.
 ep_status ep_map_match(const ep_shape *from, const ep_shape *to, const ep_map_options *options,

@@ -333,7 +333,9 @@ static void composition_multiplies(void **state) {
       assert_true(fabs(product - ac.a[j * M + i]) < 1e-6);
     }
   bc.m--;
+  ep_map_free(&ac);
   assert_int_equal(ep_map_compose(&ab, &bc, &ac, &err), EP_ERR_ARGUMENT);
+  assert_null(ac.p);
   bc.m++;
   ep_map_free(&ab);
   ep_map_free(&bc);
