@@ -67,7 +67,7 @@ static const struct argp_option align_options[] = {
 static const struct argp_option scene_options[] = {
     OPTION_JSON, OPTION_QUIET, OPTION_SET, OPTION_CACHE, {0}};
 static const struct argp_option run_options[] = {
-    {"out", KEY_OUT, "DIR", 0, "Folder of the results (default: results/NAME)", 0},
+    {"out", KEY_OUT, "DIR", 0, "Folder of the results (default: out/NAME)", 0},
     OPTION_JSON,
     OPTION_QUIET,
     OPTION_SET,

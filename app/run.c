@@ -141,7 +141,7 @@ static ep_status simulate(const ep_cli *cli, ep_session *session, const ep_model
   if (cli->out)
     EP_TRY(ep_path_join(".", cli->out, folder, err));
   else
-    EP_TRY(ep_path_join("results", session->scene.name, folder, err));
+    EP_TRY(ep_path_join("out", session->scene.name, folder, err));
   ep_record record;
   const ep_status simulated =
       ep_simulate(&session->scene, &session->shapes, &model->model, &session->log, &record, err);

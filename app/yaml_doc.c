@@ -237,7 +237,10 @@ static ep_status walk(ep_yaml *yaml, const char *path, const char *assignment, i
   while (next_component(&path, component)) {
     int next = child(&yaml->document, yaml_document_get_node(&yaml->document, *parent), last);
     if (!next) {
-      next = yaml_document_add_mapping(&yaml->document, NULL, YAML_FLOW_MAPPING_STYLE);
+      // What comes next tells what is missing: "fixed.0=..." makes a list.
+      next = index_of(component) >= 0
+                 ? yaml_document_add_sequence(&yaml->document, NULL, YAML_FLOW_SEQUENCE_STYLE)
+                 : yaml_document_add_mapping(&yaml->document, NULL, YAML_FLOW_MAPPING_STYLE);
       if (!next) return no_memory(err);
       EP_TRY(attach(yaml, *parent, last, next, assignment, err));
     }

@@ -1,0 +1,254 @@
+// Claims, through the real program: a scene runs end to end and takes its example's shape; the
+// second run takes every stage from the cache; a changed value bakes only what depends on it; two
+// bakes are byte-identical; damaged caches and models are baked again; mistakes end with the
+// documented exit code and one message; stdout carries one JSON object.
+#include <jansson.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+// clang-format off
+#include <cmocka.h>
+// clang-format on
+
+#include "base/files.h"
+#include "box.h"
+
+static const char scene_text[] =
+    "schema: 1\nname: beam\nobject: {mesh: beam.veg}\n"
+    "fixed: [{box: {low: [-1, -1, -1], high: [0.01, 1, 1]}}]\n"
+    "families: [{poses: [beam-bent.veg]}]\n"
+    "reduction: {eigenfunctions: 5, modes: 8, linear_modes: 5, path_samples: 2, elements: 15,\n"
+    "  training_poses: 20, amplitude: 0.1}\n"
+    "simulation: {dt: 0.02, steps: 60, damping: {mass: 0.5, stiffness: 0.05}}\n"
+    "loads: [{push: {box: {low: [0.9, -1, -1], high: [2, 2, 2]}, force: [0, 6, 0], ramp: 0.2}}]\n"
+    "output: {every: 10}\n";
+
+// Run the program; stdout goes to out.txt, stderr to err.txt. Returns the exit code.
+static int command(const char *format, ...) __attribute__((format(printf, 1, 2)));
+static int command(const char *format, ...) {
+  char line[4096];
+  const int used = snprintf(line, sizeof line, "%s ", EP_COMMAND);
+  va_list args;
+  va_start(args, format);
+  vsnprintf(line + used, sizeof line - (size_t)used, format, args);
+  va_end(args);
+  strncat(line, " >out.txt 2>err.txt", sizeof line - strlen(line) - 1);
+  const int status = system(line);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+static char *text_of(const char *path) {
+  char *text;
+  size_t size;
+  ep_error err = {0};
+  if (ep_file_read(path, &text, &size, &err) != EP_OK) fail_msg("%s", err.text);
+  return text;
+}
+
+static json_t *report(void) {
+  json_error_t trouble;
+  json_t *root = json_load_file("out.txt", 0, &trouble); // refuses anything after the object
+  if (!root) fail_msg("stdout is no JSON object: %s\n%s", trouble.text, text_of("err.txt"));
+  return root;
+}
+
+static double number(const json_t *root, const char *key) {
+  const json_t *value = json_object_get(root, key);
+  if (!json_is_number(value)) fail_msg("no number '%s'", key);
+  return json_number_value(value);
+}
+
+static json_t *run_scene(const char *cache, const char *more) {
+  const int code = command("run beam.yaml --json --out results --cache %s %s", cache, more);
+  if (code != 0) fail_msg("exit code %d: %s", code, text_of("err.txt"));
+  return report();
+}
+
+// Is this stage cached, in a report?
+static bool cached(const json_t *root, const char *stage) {
+  size_t index;
+  json_t *entry;
+  json_array_foreach(json_object_get(root, "stages"), index, entry) {
+    if (strcmp(json_string_value(json_object_get(entry, "name")), stage) == 0)
+      return json_is_true(json_object_get(entry, "cached"));
+  }
+  fail_msg("no stage %s", stage);
+  return false;
+}
+
+static void a_scene_runs_end_to_end(void **state) {
+  (void)state;
+  json_t *root = run_scene("cache-a", "");
+  assert_true(number(root, "vertices") == 81 && number(root, "tets") == 192);
+  assert_true(number(root, "examples") == 1 && number(root, "m") == 5 && number(root, "r") == 8);
+  assert_true(number(root, "steps_done") == 60 && number(root, "inverted_tets") == 0);
+  assert_true(number(root, "t_step_ms") > 0 && number(root, "t_step_ms") < 1000);
+  assert_int_equal(json_array_size(json_object_get(root, "weights")), 2);
+  const double held_out = number(json_object_get(root, "cubature_error"), "held_out");
+  assert_true(held_out > 0 && held_out < 0.5);
+  const double with = number(root, "example_fraction");
+  assert_false(cached(root, "modes"));
+  json_decref(root);
+  static const char *const left[] = {
+      "results/animation.pvd",  "results/animation.glb",         "results/strip.png",
+      "results/trajectory.csv", "results/frames/frame-0006.vtu", "results/summary.txt",
+      "results/summary.json"};
+  for (size_t i = 0; i < sizeof left / sizeof *left; i++)
+    if (!ep_path_exists(left[i])) fail_msg("%s is missing", left[i]);
+  assert_false(ep_path_exists("results/frames/frame-0007.vtu"));
+  root = run_scene("cache-a", "--set examples.strength=0"); // the same bake, measured only
+  assert_true(cached(root, "model"));
+  const double without = number(root, "example_fraction");
+  json_decref(root);
+  if (!(with > 1.5 * without && without > 0)) fail_msg("with %g, without %g", with, without);
+}
+
+static void the_second_run_bakes_nothing(void **state) {
+  (void)state;
+  static const char *const stages[] = {"eigen:object", "poses",    "modes", "paths",
+                                       "basis",        "cubature", "model"};
+  json_t *root = run_scene("cache-a", "");
+  for (size_t i = 0; i < 7; i++) assert_true(cached(root, stages[i]));
+  json_decref(root);
+  root = run_scene("cache-a", "--set reduction.elements=12");
+  for (size_t i = 0; i < 7; i++) assert_int_equal(cached(root, stages[i]), i < 5);
+  assert_true(number(root, "s") == 12);
+  json_decref(root);
+}
+
+static void two_bakes_are_byte_identical(void **state) {
+  (void)state;
+  assert_int_equal(command("bake beam.yaml --cache cache-b --json"), 0);
+  assert_int_equal(command("bake beam.yaml --cache cache-c --json"), 0);
+  assert_int_equal(system("diff -r cache-b cache-c"), 0);
+  assert_int_equal(system("test $(ls cache-b | wc -l) -eq 7"), 0);
+}
+
+static void damaged_results_are_baked_again(void **state) {
+  (void)state;
+  // a model cut short, and a basis with a byte changed
+  assert_int_equal(system("for f in cache-b/model-*.epm; do truncate -s 1000 $f; done"), 0);
+  assert_int_equal(system("for f in cache-b/basis-*.ept; do printf x | dd of=$f bs=1 seek=5000 "
+                          "conv=notrunc 2>/dev/null; done; rm cache-b/cubature-*"),
+                   0);
+  json_t *root = run_scene("cache-b", "");
+  assert_false(cached(root, "model"));
+  assert_false(cached(root, "basis"));
+  assert_true(cached(root, "modes"));
+  json_decref(root);
+  assert_non_null(strstr(text_of("err.txt"), "broken"));
+  assert_int_equal(system("diff -r cache-b cache-c"), 0);
+}
+
+static void expect_failure(int code, const char *part, const char *arguments) {
+  const int got = command("%s", arguments);
+  char *err = text_of("err.txt");
+  if (got != code || !strstr(err, part))
+    fail_msg("%s: exit code %d (expected %d), '%s' (expected '%s')", arguments, got, code, err,
+             part);
+  free(err);
+}
+
+static void mistakes_have_documented_exit_codes(void **state) {
+  (void)state;
+  expect_failure(1, "no command 'walk'", "walk beam.yaml");
+  expect_failure(1, "no file given", "run");
+  expect_failure(1, "count", "eigen beam.veg --count none");
+  expect_failure(2, "nowhere.yaml", "run nowhere.yaml");
+  expect_failure(2, "nowhere.veg", "eigen nowhere.veg");
+  expect_failure(3, "cut.veg", "eigen cut.veg");
+  expect_failure(5, "out of range", "plan beam.yaml --set reduction.modes=0");
+  expect_failure(5, "unknown key 'x'", "bake wrong.yaml");
+  expect_failure(9, "later version", "run free.yaml");
+  expect_failure(2, "cache-file", "bake beam.yaml --cache cache-file");
+  expect_failure(2, "is a file", "run beam.yaml --cache cache-c --out beam.yaml/results");
+  assert_int_equal(WEXITSTATUS(system(EP_COMMAND " plan beam.yaml --json >/dev/full 2>err.txt")),
+                   2);
+}
+
+static void failures_are_json_too(void **state) {
+  (void)state;
+  assert_int_equal(command("run free.yaml --json"), 9);
+  json_t *root = report();
+  const json_t *failure = json_object_get(root, "error");
+  assert_string_equal(json_string_value(json_object_get(failure, "status")), "unsupported");
+  json_decref(root);
+}
+
+// RLIMIT_FSIZE stands for a full disk: the run fails with a message, and leaves no half result.
+// (A run from a warm cache: MPI, which the baker starts, does not bear the limit.)
+static void a_full_disk_is_said(void **state) {
+  (void)state;
+  const int status = system("trap '' XFSZ; ulimit -f 4; " EP_COMMAND
+                            " run beam.yaml --cache cache-c --out full >out.txt 2>err.txt");
+  char *err = text_of("err.txt");
+  if (WEXITSTATUS(status) != 2 || !strstr(err, "cannot write all of"))
+    fail_msg("exit code %d, '%s'", WEXITSTATUS(status), err);
+  free(err);
+  assert_int_equal(system("! find full -name '*.tmp' | grep -q ."), 0);
+}
+
+static void eigenvalues_and_plans_are_printed(void **state) {
+  (void)state;
+  assert_int_equal(command("eigen beam.veg --count 5 --json --out phi.vtu"), 0);
+  json_t *root = report();
+  const json_t *list = json_object_get(root, "eigenvalues");
+  assert_int_equal(json_array_size(list), 5);
+  double before = 0;
+  for (size_t i = 0; i < 5; i++) {
+    const double value = json_number_value(json_array_get(list, i));
+    assert_true(value > 0 && value >= before);
+    before = value;
+  }
+  // a beam of length 1: the first is pi^2 up to the mesh's coarseness (error ~ h^2)
+  const double first = json_number_value(json_array_get(list, 0));
+  assert_true(first > 9.8 && first < 10.2);
+  json_decref(root);
+  assert_true(ep_path_exists("phi.vtu"));
+  assert_int_equal(command("plan beam.yaml --json --cache cache-c"), 0);
+  root = report();
+  assert_true(json_array_size(json_object_get(root, "stages")) >= 8);
+  json_decref(root);
+  assert_int_equal(command("align beam.yaml --json --cache cache-c"), 0);
+  root = report();
+  assert_int_equal(json_array_size(json_object_get(root, "maps")), 0);
+  json_decref(root);
+  assert_int_equal(command("--help"), 0);
+  assert_int_equal(command("run --help"), 0);
+  assert_int_equal(command("--version"), 0);
+}
+
+static int set_up(void **state) {
+  (void)state;
+  if (system("rm -rf cache-* results full") != 0) return 1;
+  unsetenv("EIGENPOSE_CACHE");
+  setenv("XDG_CACHE_HOME", "cache-default", 1);
+  write_box("beam.veg", 8, 2, 2, 1, 0, 1e5);
+  write_box("beam-bent.veg", 8, 2, 2, 1, 0.35, 0);
+  write_text("beam.yaml", scene_text);
+  write_text("cut.veg", "*VERTICES\n4 3 0 0\n1 0 0 0\n2 1 0\n");
+  write_text("wrong.yaml", "schema: 1\nx: 1\nobject: {mesh: beam.veg}\n");
+  write_text("free.yaml", "schema: 1\nobject: {mesh: beam.veg}\n");
+  write_text("cache-file", "");
+  return 0;
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(a_scene_runs_end_to_end),
+      cmocka_unit_test(the_second_run_bakes_nothing),
+      cmocka_unit_test(two_bakes_are_byte_identical),
+      cmocka_unit_test(damaged_results_are_baked_again),
+      cmocka_unit_test(mistakes_have_documented_exit_codes),
+      cmocka_unit_test(failures_are_json_too),
+      cmocka_unit_test(a_full_disk_is_said),
+      cmocka_unit_test(eigenvalues_and_plans_are_printed),
+  };
+  return cmocka_run_group_tests(tests, set_up, NULL);
+}

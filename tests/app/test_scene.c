@@ -1,0 +1,212 @@
+// Claims: a scene is read with its defaults; everything docs/scene.md does not allow is refused
+// with the place (line:column) and the key; --set is checked like the file; selections hold exactly
+// the vertices geometry says.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+// clang-format off
+#include <cmocka.h>
+// clang-format on
+
+#include "app/scene.h"
+#include "app/select.h"
+#include "box.h"
+#include "mesh/io.h"
+
+static ep_status parse_with(const char *text, int nsets, const char *const *sets, ep_scene *scene,
+                            ep_error *err) {
+  memset(err, 0, sizeof *err);
+  return ep_scene_parse("s.yaml", ".", text, strlen(text), nsets, sets, scene, err);
+}
+
+// A text must be refused with EP_ERR_SCENE, and the message must name all of `parts`.
+static void refused(const char *text, const char *place, const char *what) {
+  ep_scene scene;
+  ep_error err;
+  const ep_status status = parse_with(text, 0, NULL, &scene, &err);
+  if (status != EP_ERR_SCENE || !strstr(err.text, place) || !strstr(err.text, what))
+    fail_msg("scene <<%s>>\nstatus %d, message '%s'\nexpected '%s' and '%s'", text, (int)status,
+             err.text, place, what);
+}
+
+#define HEAD "schema: 1\nobject: {mesh: box.veg}\n"
+
+static void defaults_are_filled_in(void **state) {
+  (void)state;
+  ep_scene s;
+  ep_error err;
+  assert_int_equal(parse_with(HEAD, 0, NULL, &s, &err), EP_OK);
+  assert_string_equal(s.name, "s");
+  assert_string_equal(s.mesh, "./box.veg");
+  assert_int_equal(s.seed, 1);
+  assert_int_equal(s.model, EP_STVK_VOLUME);
+  assert_int_equal(s.eigenfunctions, 10);
+  assert_int_equal(s.modes, 30);
+  assert_int_equal(s.elements, 60);
+  assert_true(s.dt == 1.0 / 60 && s.steps == 120 && s.strength == 1);
+  assert_int_equal(s.solver, EP_SOLVER_NLOPT);
+  assert_int_equal(s.formats, EP_FORMAT_VTU | EP_FORMAT_GLB | EP_FORMAT_PNG);
+  assert_int_equal(s.nfixed + s.nfamilies + s.nloads, 0);
+  ep_scene_free(&s);
+}
+
+static void everything_is_read(void **state) {
+  (void)state;
+  static const char text[] =
+      "schema: 1\nname: all\nseed: 7\n"
+      "object:\n  mesh: box.veg\n"
+      "  material: {model: neohookean, density: 900, young: 2e5, poisson: 0.3}\n"
+      "fixed:\n  - plane: {point: [0, 0, 0], normal: [1, 0, 0]}\n  - file: held.txt\n"
+      "families:\n  - name: own\n    poses: [box.veg, box.veg]\n    map: {accept: true}\n"
+      "reduction: {modes: 12, amplitude: 0.1}\n"
+      "simulation: {dt: 0.01, steps: 5, damping: {mass: 0.2}}\n"
+      "examples: {strength: 0.5, force: linear, solver: newton}\n"
+      "loads:\n  - gravity: [0, -9.81, 0]\n"
+      "  - push: {file: held.txt, force: [1, 2, 3], from: 1, until: 3, ramp: 0.5}\n"
+      "output: {every: 4, formats: [glb]}\n";
+  ep_scene s;
+  ep_error err;
+  if (parse_with(text, 0, NULL, &s, &err) != EP_OK) fail_msg("%s", err.text);
+  assert_int_equal(s.model, EP_STABLE_NEOHOOKEAN);
+  assert_true(s.has_material && s.material.young == 2e5);
+  assert_int_equal(s.nfixed, 2);
+  assert_int_equal(s.fixed[0].kind, EP_SELECT_PLANE);
+  assert_int_equal(s.fixed[1].kind, EP_SELECT_FILE);
+  assert_int_equal(ep_scene_examples(&s), 2);
+  assert_true(s.family[0].accept && !s.family[0].rest);
+  assert_int_equal(s.force, EP_EXAMPLE_LINEAR);
+  assert_int_equal(s.solver, EP_SOLVER_NEWTON);
+  assert_true(s.load[0].gravity && s.load[0].vector[1] == -9.81);
+  assert_true(!s.load[1].gravity && s.load[1].until == 3);
+  assert_int_equal(s.formats, EP_FORMAT_GLB);
+  ep_scene_free(&s);
+}
+
+static void json_is_a_scene_too(void **state) {
+  (void)state;
+  ep_scene s;
+  ep_error err;
+  assert_int_equal(
+      parse_with("{\"schema\": 1, \"object\": {\"mesh\": \"box.veg\"}}", 0, NULL, &s, &err), EP_OK);
+  ep_scene_free(&s);
+}
+
+static void mistakes_are_named_with_their_place(void **state) {
+  (void)state;
+  refused("", "s.yaml", "empty");
+  refused("- 1\n", "s.yaml:1:1", "mapping");
+  refused("schema: 1\nobject: [\n", "s.yaml:3:1", "");
+  refused("object: {mesh: box.veg}\n", "s.yaml", "schema");
+  refused("schema: 2\nobject: {mesh: box.veg}\n", "s.yaml:1:9", "schema: 1");
+  refused("schema: 1\nobject: {}\n", "s.yaml", "mesh");
+  refused("schema: 1\nobject: {mesh: nowhere.veg}\n", "s.yaml:2:16", "nowhere.veg");
+  refused(HEAD "colour: red\n", "s.yaml:3:1", "'colour'");
+  refused(HEAD "reduction:\n  modes: 3\n  mods: 3\n", "s.yaml:5:3", "'mods'");
+  refused(HEAD "seed: 1\nseed: 2\n", "s.yaml:4:1", "twice");
+  refused(HEAD "reduction: {modes: many}\n", "s.yaml:3:20", "many");
+  refused(HEAD "reduction: {modes: 1.5}\n", "s.yaml:3:20", "whole");
+  refused(HEAD "reduction: {modes: 0}\n", "s.yaml:3:20", "out of range");
+  refused(HEAD "reduction: {amplitude: .nan}\n", "s.yaml:3", "amplitude");
+  refused(HEAD "simulation: {dt: nan}\n", "s.yaml:3:18", "simulation.dt");
+  refused(HEAD "simulation: {dt: inf}\n", "s.yaml:3:18", "simulation.dt");
+  refused(HEAD "simulation: {dt: -1}\n", "s.yaml:3:18", "out of range");
+  refused(HEAD "examples: {solver: magic}\n", "s.yaml:3", "magic");
+  refused(HEAD "fixed: [{}]\n", "s.yaml:3:9", "one of box, plane, file");
+  refused(HEAD "fixed: [{box: {low: [1, 0, 0], high: [0, 1, 1]}}]\n", "s.yaml:3", "low 1");
+  refused(HEAD "fixed: [{box: {low: [1, 0], high: [0, 1, 1]}}]\n", "s.yaml:3", "low");
+  refused(HEAD "fixed: [{plane: {point: [0, 0, 0], normal: [0, 0, 0]}}]\n", "s.yaml:3", "normal");
+  refused(HEAD "families: [{name: a}]\n", "s.yaml", "poses");
+  refused(HEAD "families: [{poses: [no.veg]}]\n", "s.yaml:3:21", "no.veg");
+  refused(HEAD "families: [{name: a, poses: [box.veg]}, {name: a, poses: [box.veg]}]\n",
+          "s.yaml:3:48", "another family");
+  refused(HEAD "families: [{poses: [box.veg, box.veg]}]\nreduction: {modes: 1}\n", "s.yaml:4:20",
+          "2 examples");
+  refused(HEAD "loads: [{gravity: [0, 0, 1], push: {file: held.txt, force: [0, 0, 1]}}]\n",
+          "s.yaml:3:9", "one of gravity, push");
+  refused(HEAD "loads: [{push: {file: held.txt, force: [0, 0, 1], from: 2, until: 1}}]\n",
+          "s.yaml:3", "before it begins");
+  refused(HEAD "loads: [{push: {file: held.txt, force: [0, 0, 1], until: 1, ramp: 0.6}}]\n",
+          "s.yaml:3", "do not fit");
+  refused("schema: 1\nobject: {mesh: box.veg, material: {young: 1e5}}\n", "s.yaml:2", "all of");
+}
+
+static void overrides_are_checked_like_the_file(void **state) {
+  (void)state;
+  ep_scene s;
+  ep_error err;
+  const char *good[] = {"reduction.modes=12", "output.formats=[png]",
+                        "fixed.0={box: {low: [0, 0, 0], high: [1, 1, 1]}}",
+                        "fixed.0.box.high=[2, 2, 2]"};
+  if (parse_with(HEAD, 4, good, &s, &err) != EP_OK) fail_msg("%s", err.text);
+  assert_int_equal(s.modes, 12);
+  assert_int_equal(s.formats, EP_FORMAT_PNG);
+  assert_true(s.nfixed == 1 && s.fixed[0].b[0] == 2);
+  ep_scene_free(&s);
+  const char *bad[] = {"reduction.mods=12", "reduction.modes=1.5", "modes",      "fixed.3={}",
+                       "schema.x=1",        "simulation.dt=nan",   "seed=[1, 2", "=3"};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    assert_int_equal(parse_with(HEAD, 1, &bad[i], &s, &err), EP_ERR_SCENE);
+    assert_non_null(strstr(err.text, "--set"));
+  }
+}
+
+// Vertices of the 4 x 1 x 1 box with cells of 0.25: 5 x 2 x 2.
+static void selections_hold_what_geometry_says(void **state) {
+  (void)state;
+  ep_mesh mesh;
+  ep_error err = {0};
+  unsigned char chosen[20] = {0};
+  int count;
+  assert_int_equal(ep_mesh_read("box.veg", &mesh, NULL, NULL, &err), EP_OK);
+  assert_int_equal(mesh.nv, 20);
+  ep_selection box = {.kind = EP_SELECT_BOX, .a = {-1, -1, -1}, .b = {0.25, 1, 1}};
+  assert_int_equal(ep_select_vertices(&box, &mesh, chosen, &count, &err), EP_OK);
+  assert_int_equal(count, 8); // two of five layers, the boundary included
+  ep_selection plane = {.kind = EP_SELECT_PLANE, .a = {0.6, 0, 0}, .b = {-1, 0, 0}};
+  assert_int_equal(ep_select_vertices(&plane, &mesh, chosen, &count, &err), EP_OK);
+  assert_int_equal(count, 8); // behind the plane: x >= 0.6
+  box.b[0] = -0.5;
+  assert_int_equal(ep_select_vertices(&box, &mesh, chosen, &count, &err), EP_ERR_SCENE);
+  ep_mesh_free(&mesh);
+}
+
+static void vertex_lists_are_checked(void **state) {
+  (void)state;
+  ep_mesh mesh;
+  ep_error err = {0};
+  unsigned char chosen[20] = {0};
+  int count;
+  assert_int_equal(ep_mesh_read("box.veg", &mesh, NULL, NULL, &err), EP_OK);
+  assert_int_equal(ep_select_parse("f", "1, 2,\n20 # last\n2", &mesh, chosen, &count, &err), EP_OK);
+  assert_int_equal(count, 3);
+  assert_true(chosen[0] && chosen[1] && chosen[19] && !chosen[2]);
+  static const char *const bad[] = {"1\n0", "1\n21", "1\nx", "1\n2x", "1\n-3", "1\n1.5"};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    memset(&err, 0, sizeof err);
+    assert_int_equal(ep_select_parse("f", bad[i], &mesh, chosen, &count, &err), EP_ERR_FORMAT);
+    assert_non_null(strstr(err.text, "f:2:"));
+  }
+  ep_mesh_free(&mesh);
+}
+
+static int set_up(void **state) {
+  (void)state;
+  write_box("box.veg", 4, 1, 1, 1, 0, 0);
+  write_text("held.txt", "1,2,3\n");
+  return 0;
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(defaults_are_filled_in),
+      cmocka_unit_test(everything_is_read),
+      cmocka_unit_test(json_is_a_scene_too),
+      cmocka_unit_test(mistakes_are_named_with_their_place),
+      cmocka_unit_test(overrides_are_checked_like_the_file),
+      cmocka_unit_test(selections_hold_what_geometry_says),
+      cmocka_unit_test(vertex_lists_are_checked),
+  };
+  return cmocka_run_group_tests(tests, set_up, NULL);
+}
