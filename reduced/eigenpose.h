@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "base/status.h"
+#include "reduced/integrator.h"
 #include "reduced/material.h"
 #include "reduced/model_arrays.h"
 
@@ -105,6 +106,7 @@ typedef enum ep_example_force { EP_EXAMPLE_ENERGY, EP_EXAMPLE_LINEAR } ep_exampl
 
 typedef struct ep_step_def {
   int cookie;                     // set by ep_default_step; a def made otherwise is refused
+  ep_integrator integrator;       // EP_IMPLICIT_EULER
   double dt;                      // [s]
   const double *force;            // (r) generalised external force U^T f, or NULL
   double damping_mass;            // Rayleigh alpha [1/s]
@@ -126,10 +128,17 @@ typedef struct ep_step_report {
   double elastic_energy, example_energy, kinetic_energy;
 } ep_step_report;
 
-// One implicit Euler step: weights and target from the state's q, then the minimum of the
-// incremental potential with the target frozen. report may be NULL.
+// One implicit step: weights and target from the state's q, then the minimum of the incremental
+// potential with the target frozen. Writing q or velocity, or another integrator, between steps is
+// fine: the two-step formula and the acceleration then start anew. report may be NULL.
 // Errors: EP_ERR_ARGUMENT (def), EP_ERR_NUMERIC (no convergence, NaN): the state is unchanged.
 ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *report);
+
+// The example force of a step with the target of the last interpolation (ep_interpolate, ep_step)
+// as a potential: its energy at q, gradient f and Hessian h as in ep_elastic_energy, with
+// def->strength and def->example_force. Zero without examples.
+double ep_example_force_energy(ep_state *state, const ep_step_def *def, const double *q, double *f,
+                               double *h, int project);
 
 // Only the interpolation part of a step, for timing and for engines that run it less often.
 ep_status ep_interpolate(ep_state *state, const ep_step_def *def, ep_target_report *report);

@@ -31,7 +31,13 @@
   X(trial_g, r)                                                                                   \
   X(h, r * r)                                                                                     \
   X(factor, r * r)                                                                                \
-  X(aside, r)              /* step: free flight */              \
+  X(aside, r)              /* step: reduced/integrator.h's ahead and base */                       \
+  X(base, r)                                                                                      \
+  X(a, r)                  /* the motion so far: acceleration, the step before, and where the */  \
+  X(q_before, r)           /* last step ended (the caller may have written q or v since) */       \
+  X(v_before, r)                                                                                  \
+  X(end_q, r)                                                                                     \
+  X(end_v, r)                                                                                     \
   X(next_w, k + 1)         /* interpolation under way: kept only when the step succeeds */        \
   X(next_target, r)                                                                               \
   X(work, r)
@@ -46,6 +52,7 @@ struct ep_state {
   double force_scale;   // sum_j w_j (lambda + 2 mu) |G_j|: generalised force at unit strain
   double strain_scale;  // max_j |G_j|_F: strain by a unit q
   int has_target;       // a target was found before
+  double dt_before;     // of the last step; 0: none, or q or v was written since
 #define X(name, count) double *name;
   EP_STATE_ARRAYS(X)
 #undef X

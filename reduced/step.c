@@ -1,6 +1,7 @@
-// Implicit Euler as the minimum of the incremental potential (DESIGN "Time step"), in
+// A step as the minimum of the incremental potential (DESIGN "Time step"; reduced/integrator.h), in
 // mass-orthonormal coordinates (U^T M U = I):
-//   Phi(x) = |x - q - h v|^2 / (2 h^2) + (x - q)^T D (x - q) / (2 h) + W(x) + beta W_t(x) - f . x
+//   Phi(x) = inertia |x - ahead|^2 / 2 + rate (x - base)^T D (x - base) / 2 + W(x) + beta W_t(x) -
+//   f . x
 // with D = alpha I + beta' K0 and the target's energy W_t frozen within the step.
 #include <math.h>
 #include <string.h>
@@ -22,7 +23,7 @@ static int valid(const ep_step_def *d) {
   return d->cookie == COOKIE && d->dt > 0 && isfinite(d->dt) && d->damping_mass >= 0 &&
          isfinite(d->damping_mass) && d->damping_stiffness >= 0 && isfinite(d->damping_stiffness) &&
          d->strength >= 0 && isfinite(d->strength) && d->tolerance > 0 && d->target_tolerance > 0 &&
-         d->max_iterations > 0 &&
+         d->max_iterations > 0 && ep_integrator_name(d->integrator) != NULL &&
          (d->example_force == EP_EXAMPLE_ENERGY || d->example_force == EP_EXAMPLE_LINEAR);
 }
 
@@ -30,16 +31,17 @@ typedef struct step {
   ep_state *state;
   const ep_step_def *def;
   int examples;            // an example force acts
+  double rate, inertia;    // of the integrator
   double internal, linear; // last evaluation: |force| inside, energy of the linear example force
 } step;
 
-// y = scale * K0 (x - origin) added to g; returns (x - origin)^T K0 (x - origin).
+// y = scale * K0 (x - origin) added to g; returns (x - origin)^T K0 (x - origin). origin NULL: 0.
 static double add_k0(const step *s, double scale, const double *x, const double *origin,
                      double *g) {
   const int r = s->state->model->size.r;
   const double *k0 = s->state->model->k0;
   double *d = s->state->work, square = 0;
-  for (int a = 0; a < r; a++) d[a] = x[a] - origin[a];
+  for (int a = 0; a < r; a++) d[a] = x[a] - (origin ? origin[a] : 0);
   for (int a = 0; a < r; a++) {
     double sum = ep_dot(r, k0 + (size_t)a * (size_t)r, d);
     square += d[a] * sum;
@@ -69,13 +71,13 @@ static double energy(void *user, const double *x, double *g, double *h, int proj
   ep_state *state = s->state;
   const ep_step_def *def = s->def;
   const int r = state->model->size.r;
-  const double inertia = 1 / (def->dt * def->dt), drag = def->damping_mass / def->dt;
+  const double inertia = s->inertia, drag = def->damping_mass * s->rate;
   double sum = inner_energy(s, x, g, h, project);
   if (g) s->internal = sqrt(ep_dot(r, g, g));
-  const double viscous = def->damping_stiffness / def->dt;
-  if (viscous > 0) sum += 0.5 * viscous * add_k0(s, viscous, x, state->q, g);
+  const double viscous = def->damping_stiffness * s->rate;
+  if (viscous > 0) sum += 0.5 * viscous * add_k0(s, viscous, x, state->base, g);
   for (int a = 0; a < r; a++) {
-    double ahead = x[a] - state->aside[a], moved = x[a] - state->q[a];
+    double ahead = x[a] - state->aside[a], moved = x[a] - state->base[a];
     double force = def->force ? def->force[a] : 0;
     sum += 0.5 * (inertia * ahead * ahead + drag * moved * moved) - force * x[a];
     if (g) g[a] += inertia * ahead + drag * moved - force;
@@ -95,17 +97,43 @@ static double residual(void *user, const double *x, const double *g) {
   const int r = state->model->size.r;
   double ahead = 0, force = s->def->force ? sqrt(ep_dot(r, s->def->force, s->def->force)) : 0;
   for (int a = 0; a < r; a++) ahead += (x[a] - state->aside[a]) * (x[a] - state->aside[a]);
-  double scale =
-      force + s->internal + sqrt(ahead) / (s->def->dt * s->def->dt) + 1e-8 * state->force_scale;
+  double scale = force + s->internal + sqrt(ahead) * s->inertia + 1e-8 * state->force_scale;
   return sqrt(ep_dot(r, g, g)) / scale;
+}
+
+// Acceleration from the equation of motion, a = f - dW/dq - D v, where no step before left it.
+static void start_acceleration(step *s) {
+  ep_state *state = s->state;
+  const ep_step_def *def = s->def;
+  inner_energy(s, state->q, state->g, NULL, 0);
+  if (def->damping_stiffness > 0) add_k0(s, def->damping_stiffness, state->v, NULL, state->g);
+  for (int a = 0; a < state->model->size.r; a++)
+    state->a[a] = (def->force ? def->force[a] : 0) - state->g[a] - def->damping_mass * state->v[a];
+}
+
+// What the integrator makes of the motion so far. Where the caller wrote q or v since the last
+// step, there is no motion before.
+static void predict(step *s) {
+  ep_state *state = s->state;
+  const size_t r = (size_t)state->model->size.r;
+  if (memcmp(state->q, state->end_q, r * sizeof *state->q) != 0 ||
+      memcmp(state->v, state->end_v, r * sizeof *state->v) != 0)
+    state->dt_before = 0;
+  if (s->def->integrator == EP_NEWMARK && state->dt_before == 0) start_acceleration(s);
+  const ep_motion motion = {.q = state->q,
+                            .v = state->v,
+                            .a = state->a,
+                            .q_before = state->q_before,
+                            .v_before = state->v_before,
+                            .dt_before = state->dt_before};
+  ep_integrator_predict(s->def->integrator, r, s->def->dt, &motion, state->base, state->aside,
+                        &s->rate, &s->inertia);
 }
 
 // Start at the free flight or at rest, whichever has the lower potential.
 static void choose_start(step *s) {
   ep_state *state = s->state;
   const size_t bytes = (size_t)state->model->size.r * sizeof(double);
-  for (int a = 0; a < state->model->size.r; a++)
-    state->aside[a] = state->q[a] + s->def->dt * state->v[a];
   double still = energy(s, state->q, NULL, NULL, 0);
   double flight = energy(s, state->aside, NULL, NULL, 0);
   memcpy(state->x, flight < still ? state->aside : state->q, bytes);
@@ -114,9 +142,13 @@ static void choose_start(step *s) {
 static void finish(step *s) {
   ep_state *state = s->state;
   for (int a = 0; a < state->model->size.r; a++) {
-    state->v[a] = (state->x[a] - state->q[a]) / s->def->dt;
-    state->q[a] = state->x[a];
+    state->q_before[a] = state->q[a];
+    state->v_before[a] = state->v[a];
+    state->a[a] = s->inertia * (state->x[a] - state->aside[a]);
+    state->v[a] = state->end_v[a] = s->rate * (state->x[a] - state->base[a]);
+    state->q[a] = state->end_q[a] = state->x[a];
   }
+  state->dt_before = s->def->dt;
   if (s->examples) ep_commit_target(state);
 }
 
@@ -135,6 +167,7 @@ ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *repor
                       .user = &s,
                       .tolerance = def->tolerance,
                       .max_iterations = def->max_iterations};
+  predict(&s);
   choose_start(&s);
   ep_status status = ep_newton_minimise(state, &newton);
   report->newton_iterations = newton.iterations;
@@ -149,6 +182,22 @@ ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *repor
         def->example_force == EP_EXAMPLE_ENERGY ? state->term[1].energy : s.linear;
   report->kinetic_energy = 0.5 * ep_dot(state->model->size.r, state->v, state->v);
   return EP_OK;
+}
+
+double ep_example_force_energy(ep_state *state, const ep_step_def *def, const double *q, double *f,
+                               double *h, int project) {
+  const int r = state->model->size.r;
+  const step s = {.state = state, .def = def};
+  if (f) memset(f, 0, (size_t)r * sizeof *f);
+  if (h) memset(h, 0, (size_t)(r * r) * sizeof *h);
+  if (state->model->size.k == 0 || def->strength == 0) return 0;
+  if (def->example_force == EP_EXAMPLE_ENERGY) {
+    state->term[0] = (ep_kernel_term){
+        .scale = def->strength, .inverse = state->target_inverse, .weight = state->target_weight};
+    return ep_evaluate(state, 1, q, f, h, project);
+  }
+  for (int i = 0; h && i < r * r; i++) h[i] = def->strength * state->model->k0[i];
+  return 0.5 * def->strength * add_k0(&s, def->strength, q, state->target, f);
 }
 
 ep_status ep_interpolate(ep_state *state, const ep_step_def *def, ep_target_report *report) {
