@@ -32,6 +32,15 @@ ep_status ep_regions_parse(const char *name, const char *bytes, int shapes,
                            const ep_mesh *const *meshes, ep_regions *out, ep_error *err);
 void ep_regions_free(ep_regions *regions);
 
+// A point of one shape that belongs to a point of the other: vertices of the meshes, from 0, or
+// where a vertex is -1 a point in space near its mesh (moved to the nearest point of it).
+typedef struct ep_landmark {
+  int from_vertex, to_vertex;
+  double from[3], to[3]; // [model units] of each mesh, read where the vertex is -1
+} ep_landmark;
+
+enum { EP_LANDMARKS_MAX = 64 };
+
 typedef enum ep_verdict { EP_MAP_GOOD, EP_MAP_DOUBTFUL, EP_MAP_BAD } ep_verdict;
 
 typedef struct ep_region_quality {
@@ -41,9 +50,22 @@ typedef struct ep_region_quality {
   bool suspect;                           // best_match differs, or the robust weight gave it up
 } ep_region_quality;
 
+// One frame the map was tried in.
+typedef struct ep_frame_candidate {
+  char name[32];      // "authored", "landmarks", "regions", "axes", "axes, half turn about x", ..
+  double rotation[9]; // to's frame -> from's, after reframing; det -1 where reflected
+  bool reflected;
+  double start_angle; // degrees between the authored frame and where this one started
+  double score;       // lower is better: what the choice went by
+  double distance;    // rms distance of the mapped points, over the rms radius, frames aligned
+  double cycle;       // round trip, as in the record
+  double landmark;    // rms distance of the landmarks' images from where they belong; -1 without
+  bool chosen, rival; // the map's own frame; another one that is not clearly worse
+} ep_frame_candidate;
+
 typedef struct ep_map_quality {
   ep_verdict verdict;
-  char reasons[512];                      // why not good; what to give; empty where good
+  char reasons[1024];                     // why not good; what to give; empty where good
   double residual_before, residual_after; // coupling, all regions (0 without regions)
   double orthogonality;                   // |A^T A - I| max
   double determinant;                     // of A, +-1
@@ -55,6 +77,17 @@ typedef struct ep_map_quality {
   double frame_angle; // degrees between authored and final frame
   int regions;
   ep_region_quality *region; // (regions) or NULL
+  int coupled_functions; // m of the coupling: fewer than the map's where regions determine fewer
+  int coupling_k;        // chosen by held-out regions, with mu; 0 without regions
+  double coupling_mu, held_out; // relative residual of the regions left out, each in its turn
+  int landmarks;
+  double landmark_residual;      // rms distance over the rms radius; 0 without landmarks
+  int candidates, rivals;        // frames tried; of those, rivals of the chosen one
+  ep_frame_candidate *candidate; // (candidates), authored frame first
+  // The landmark that would settle the choice: vertex of `from` and where the chosen frame and the
+  // rival take it; -1 where the choice is clear.
+  int settle_from, settle_to, settle_other;
+  int inverted, inverted_left; // tets of `from` after pose transfer and after repair; -1: not told
 } ep_map_quality;
 
 // A map "from" -> "to": for every vertex of `from` a vertex of `to`; functional map and coupled
@@ -62,19 +95,32 @@ typedef struct ep_map_quality {
 typedef struct ep_map {
   int n, m;
   int *p;             // (n) vertex of `to`
+  int *tet;           // (n) the tet of `to` that holds the point a vertex is sent to, and
+  double *weight;     // (n x 4) the point's barycentric coordinates in it: finer than p
   double *c;          // (m x m) C = Phi_from^T M_from Phi_to[p], row-major
   double *a;          // (m x m) polar(C^T): coupled basis of `to` is Phi_to A
-  double rotation[9]; // to's frame -> from's frame: x_from ~ scale R (x_to - ct) + cf
+  double rotation[9]; // det -1 only where reflections were asked for; to's frame -> from's frame:
+                      // x_from ~ scale R (x_to - ct) + cf
   double scale, center_from[3], center_to[3];
   ep_map_quality quality;
 } ep_map;
 void ep_map_free(ep_map *map);
+// out (n x width) = values (to's vertices x width) at the points the map sends from's vertices to.
+void ep_map_pull(const ep_map *map, const ep_mesh *to, int width, const double *values,
+                 double *out);
+// Tell the record how many tets of `from` the transferred pose left inverted, before and after
+// repair: part of the verdict from then on.
+void ep_map_note_inverted(ep_map *map, int inverted, int left);
 
 typedef struct ep_map_options {
-  int m;                      // functions of the final map
-  bool same_family;           // rest and pose of one family: turned poses expected
-  const ep_regions *regions;  // NULL: automatic
-  int from_column, to_column; // columns of the two shapes in regions
+  int m;                       // functions of the final map
+  bool same_family;            // rest and pose of one family: turned poses expected
+  const ep_regions *regions;   // NULL: automatic
+  int from_column, to_column;  // columns of the two shapes in regions
+  int landmarks;               // at most EP_LANDMARKS_MAX
+  const ep_landmark *landmark; // (landmarks), borrowed
+  bool reflections;            // mirrored frames are candidates too
+  bool keep_frame; // the authored frame is known to be right: no other is tried, no doubt about it
 } ep_map_options;
 ep_map_options ep_default_map_options(void);
 
@@ -86,8 +132,10 @@ ep_map_options ep_default_map_options(void);
 ep_status ep_map_match(const ep_shape *from, const ep_shape *to, const ep_map_options *options,
                        ep_log *log, ep_map *out, ep_error *err);
 
-// pose o rest: p[i] = second->p[first->p[i]], matrices multiplied, quality of the worse.
-ep_status ep_map_compose(const ep_map *first, const ep_map *second, ep_map *out, ep_error *err);
+// pose o rest: points sent on through `middle`, p[i] = second->p[first->p[i]], matrices multiplied,
+// quality of the worse. first: from -> middle, second: middle -> to.
+ep_status ep_map_compose(const ep_map *first, const ep_mesh *middle, const ep_map *second,
+                         const ep_mesh *to, ep_map *out, ep_error *err);
 
 // Coupled basis from region functions with the object's basis fixed (B = I): minimise
 //   mu_off * ordered off-diagonal penalty of A^T Lambda A + robust |F^T - G^T A|^2, A^T A = I,

@@ -39,6 +39,9 @@ static ep_status compose_quality(const ep_map *first, const ep_map *second, ep_m
       worse(&second->quality, &first->quality) ? &second->quality : &first->quality;
   out->quality = *from;
   out->quality.region = NULL;
+  out->quality.candidate = NULL;
+  out->quality.candidates = out->quality.rivals = 0;
+  out->quality.settle_from = out->quality.settle_to = out->quality.settle_other = -1;
   out->quality.determinant = first->quality.determinant * second->quality.determinant;
   out->quality.frame_angle = ep_frame_angle(out->rotation);
   if (from->regions == 0) return EP_OK;
@@ -50,22 +53,43 @@ static ep_status compose_quality(const ep_map *first, const ep_map *second, ep_m
   return EP_OK;
 }
 
-ep_status ep_map_compose(const ep_map *first, const ep_map *second, ep_map *out, ep_error *err) {
+// Where the points of the first map go in `to`, and the tets there that hold them.
+static ep_status compose_points(const ep_map *first, const ep_mesh *middle, const ep_map *second,
+                                const ep_mesh *to, ep_map *out, ep_error *err) {
+  double *there = malloc(3 * (size_t)second->n * sizeof *there);
+  double *point = malloc(3 * (size_t)first->n * sizeof *point);
+  ep_status status =
+      there && point ? EP_OK : ep_fail(err, EP_ERR_MEMORY, "no memory to compose maps");
+  if (status == EP_OK) {
+    ep_map_pull(second, to, 3, to->x, there);
+    ep_map_pull(first, middle, 3, there, point);
+    status = ep_points_project(to, 3, to->x, first->n, point, out->p, out->tet, out->weight, err);
+  }
+  free(there);
+  free(point);
+  return status;
+}
+
+ep_status ep_map_compose(const ep_map *first, const ep_mesh *middle, const ep_map *second,
+                         const ep_mesh *to, ep_map *out, ep_error *err) {
   memset(out, 0, sizeof *out);
   EP_TRY(check(first, second, err));
   const int m = first->m;
   ep_map made = {.n = first->n, .m = m};
   made.p = malloc((size_t)made.n * sizeof *made.p);
+  made.tet = malloc((size_t)made.n * sizeof *made.tet);
+  made.weight = malloc(4 * (size_t)made.n * sizeof *made.weight);
   made.c = malloc((size_t)m * m * sizeof *made.c);
   made.a = malloc((size_t)m * m * sizeof *made.a);
-  ep_status status = made.p && made.c && made.a
+  ep_status status = made.p && made.tet && made.weight && made.c && made.a
                          ? compose_quality(first, second, &made, err)
                          : ep_fail(err, EP_ERR_MEMORY, "no memory to compose maps");
+  for (int i = 0; i < made.n && status == EP_OK; i++) made.p[i] = second->p[first->p[i]];
+  if (status == EP_OK) status = compose_points(first, middle, second, to, &made, err);
   if (status != EP_OK) {
     ep_map_free(&made);
     return status;
   }
-  for (int i = 0; i < made.n; i++) made.p[i] = second->p[first->p[i]];
   ep_gemm(m, m, m, first->c, second->c, made.c); // Phi_2[p2][p1] = Phi_1[p1] C2 = Phi_0 C1 C2
   ep_gemm(m, m, m, second->a, first->a, made.a);
   compose_frames(first, second, &made);

@@ -25,10 +25,26 @@ ep_map_options ep_default_map_options(void) {
 void ep_map_free(ep_map *map) {
   if (!map) return;
   free(map->p);
+  free(map->tet);
+  free(map->weight);
   free(map->c);
   free(map->a);
   free(map->quality.region);
+  free(map->quality.candidate);
   memset(map, 0, sizeof *map);
+}
+
+void ep_map_pull(const ep_map *map, const ep_mesh *to, int width, const double *values,
+                 double *out) {
+  for (int i = 0; i < map->n; i++) {
+    const int *corner = to->tet + 4 * (size_t)map->tet[i];
+    const double *w = map->weight + 4 * (size_t)i;
+    for (int c = 0; c < width; c++) {
+      double sum = 0;
+      for (int j = 0; j < 4; j++) sum += w[j] * values[(size_t)corner[j] * width + c];
+      out[(size_t)i * width + c] = sum;
+    }
+  }
 }
 
 // One trial: a map there and back in its final frame.
@@ -36,6 +52,8 @@ typedef struct trial {
   double r[9], cycle;
   int rounds;
   int *p, *back;
+  int *tet;       // (from->n)
+  double *weight; // (from->n x 4)
 } trial;
 
 typedef struct job {
@@ -49,12 +67,18 @@ static ep_status make_trial(const job *j, trial *t, ep_error *err) {
   memset(t, 0, sizeof *t);
   t->p = malloc((size_t)j->from.n * sizeof *t->p);
   t->back = malloc((size_t)j->to.n * sizeof *t->back);
-  return t->p && t->back ? EP_OK : ep_fail(err, EP_ERR_MEMORY, "no memory for a map");
+  t->tet = malloc((size_t)j->from.n * sizeof *t->tet);
+  t->weight = malloc(4 * (size_t)j->from.n * sizeof *t->weight);
+  return t->p && t->back && t->tet && t->weight
+             ? EP_OK
+             : ep_fail(err, EP_ERR_MEMORY, "no memory for a map");
 }
 
 static void free_trial(trial *t) {
   free(t->p);
   free(t->back);
+  free(t->tet);
+  free(t->weight);
   memset(t, 0, sizeof *t);
 }
 
@@ -84,17 +108,17 @@ static double angle_between(const double a[9], const double b[9]) {
 // Match, turn the frame to what the map says, match again (step 4); then the way back (step 5).
 static ep_status match_from_frame(const job *j, trial *t, ep_error *err) {
   const ep_match_rule rule = rule_of(j);
-  EP_TRY(ep_match_levels(&j->from, &j->to, t->r, &rule, t->p, err));
+  EP_TRY(ep_match_levels(&j->from, &j->to, t->r, &rule, t->p, t->tet, t->weight, err));
   for (t->rounds = 0; t->rounds < REFRAME_ROUNDS; t->rounds++) {
     double turned[9];
     EP_TRY(ep_frame_from_map(&j->from, &j->to, t->p, turned, err));
     if (angle_between(turned, t->r) < REFRAME_DEGREES) break;
     memcpy(t->r, turned, sizeof turned);
-    EP_TRY(ep_match_levels(&j->from, &j->to, t->r, &rule, t->p, err));
+    EP_TRY(ep_match_levels(&j->from, &j->to, t->r, &rule, t->p, t->tet, t->weight, err));
   }
   double back[9];
   ep_frame_transpose(t->r, back);
-  EP_TRY(ep_match_levels(&j->to, &j->from, back, &rule, t->back, err));
+  EP_TRY(ep_match_levels(&j->to, &j->from, back, &rule, t->back, NULL, NULL, err));
   t->cycle = ep_match_cycle(&j->from, t->p, t->back);
   return EP_OK;
 }
@@ -121,9 +145,9 @@ static ep_status try_plain(const job *j, trial *best, ep_error *err) {
     memcpy(t.r, best->r, sizeof t.r);
     t.rounds = best->rounds;
     ep_frame_transpose(t.r, back);
-    status = ep_match_plain(&j->from, &j->to, t.r, t.p, err);
+    status = ep_match_plain(&j->from, &j->to, t.r, t.p, t.tet, t.weight, err);
   }
-  if (status == EP_OK) status = ep_match_plain(&j->to, &j->from, back, t.back, err);
+  if (status == EP_OK) status = ep_match_plain(&j->to, &j->from, back, t.back, NULL, NULL, err);
   if (status == EP_OK) {
     t.cycle = ep_match_cycle(&j->from, t.p, t.back);
     if (t.cycle < best->cycle) take_trial(best, &t);
@@ -199,7 +223,12 @@ static ep_status finish(job *j, trial *t, ep_map *out, ep_error *err) {
   out->n = j->from.n;
   out->m = j->options->m;
   out->p = t->p;
-  t->p = NULL;
+  out->tet = t->tet;
+  out->weight = t->weight;
+  t->p = t->tet = NULL;
+  t->weight = NULL;
+  out->quality.settle_from = out->quality.settle_to = out->quality.settle_other = -1;
+  out->quality.inverted = out->quality.inverted_left = -1;
   out->c = malloc(square * sizeof *out->c);
   out->a = malloc(square * sizeof *out->a);
   if (!out->c || !out->a) return ep_fail(err, EP_ERR_MEMORY, "no memory for a map");

@@ -150,7 +150,8 @@ static ep_status match_level(matcher *w, int kk, int *p, ep_error *err) {
 }
 
 ep_status ep_match_levels(const ep_side *from, const ep_side *to, const double r[9],
-                          const ep_match_rule *rule, int *p, ep_error *err) {
+                          const ep_match_rule *rule, int *p, int *tet, double *weight,
+                          ep_error *err) {
   if (from->k != to->k || rule->k > from->k)
     return ep_fail(err, EP_ERR_ARGUMENT, "matching with %d of %d and %d functions", rule->k,
                    from->k, to->k);
@@ -160,23 +161,29 @@ ep_status ep_match_levels(const ep_side *from, const ep_side *to, const double r
   ep_status status = match_level(&w, 0, p, err);
   const int first = rule->k < FIRST_FUNCTIONS ? rule->k : FIRST_FUNCTIONS;
   for (int kk = first; kk <= rule->k && status == EP_OK; kk++) status = match_level(&w, kk, p, err);
+  if (status == EP_OK && tet)
+    status = ep_points_project(to->shape->mesh, rule->k + 3 + w.regions, w.target, from->n, w.query,
+                               p, tet, weight, err);
   free_matcher(&w);
   return status;
 }
 
 ep_status ep_match_plain(const ep_side *from, const ep_side *to, const double r[9], int *p,
-                         ep_error *err) {
+                         int *tet, double *weight, ep_error *err) {
   double *turned = malloc(3 * (size_t)to->n * sizeof *turned);
   if (!turned) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d points", to->n);
   ep_frame_apply(to->n, r, to->x, turned);
-  ep_tree *tree;
-  const ep_status status = ep_tree_make(to->n, 3, turned, &tree, err);
+  ep_tree *tree = NULL;
+  ep_status status = ep_tree_make(to->n, 3, turned, &tree, err);
+  if (status == EP_OK) {
+    for (int i = 0; i < from->n; i++) p[i] = -1;
+    ep_tree_nearest(tree, from->n, from->x, p);
+    if (tet)
+      status = ep_points_project(to->shape->mesh, 3, turned, from->n, from->x, p, tet, weight, err);
+  }
   free(turned);
-  if (status != EP_OK) return status;
-  for (int i = 0; i < from->n; i++) p[i] = -1;
-  ep_tree_nearest(tree, from->n, from->x, p);
   ep_tree_free(tree);
-  return EP_OK;
+  return status;
 }
 
 double ep_match_cycle(const ep_side *from, const int *p, const int *back) {

@@ -19,6 +19,14 @@ void ep_tree_free(ep_tree *tree);
 // nearest point, the lowest index among equals. queries (count x d).
 void ep_tree_nearest(const ep_tree *tree, int count, const double *queries, int *nearest);
 
+// ---- points.c
+// The nearest point of the mesh whose vertices have `coords` (nv x d), for each query (count x d):
+// its tet and barycentric coordinates (count x 4). Searched downhill from the tets around vertex
+// start[i]. Errors: memory.
+ep_status ep_points_project(const ep_mesh *mesh, int d, const double *coords, int count,
+                            const double *query, const int *start, int *tet, double *weight,
+                            ep_error *err);
+
 // ---- side.c: a shape made scale-free: centred at its centroid, lengths over V^(1/3), functions
 // times sqrt(V), so that both sides of a map are comparable.
 typedef struct ep_side {
@@ -66,12 +74,14 @@ typedef struct ep_match_rule {
   const unsigned char *use; // (regions) which take part, NULL: all
 } ep_match_rule;
 
-// p (from->n): the map in frame r. Errors: memory.
+// p (from->n): the map in frame r; tet (n), weight (n x 4): the finer map, both or neither NULL.
+// Errors: memory.
 ep_status ep_match_levels(const ep_side *from, const ep_side *to, const double r[9],
-                          const ep_match_rule *rule, int *p, ep_error *err);
+                          const ep_match_rule *rule, int *p, int *tet, double *weight,
+                          ep_error *err);
 // Nearest neighbours of the positions alone.
 ep_status ep_match_plain(const ep_side *from, const ep_side *to, const double r[9], int *p,
-                         ep_error *err);
+                         int *tet, double *weight, ep_error *err);
 // C (k x k) = Phi_from^T M Phi_to[p], scale-free.
 ep_status ep_match_functional(const ep_side *from, const ep_side *to, const int *p, double *c,
                               ep_error *err);

@@ -326,6 +326,22 @@ static void weigh(ep_map_quality *q, const char *what, double value, double doub
            used ? "; " : "", what, value, high ? "at most" : "at least", doubtful, advice);
 }
 
+static void weigh_inverted(ep_map_quality *q) {
+  if (q->inverted_left <= 0) return;
+  const size_t used = strlen(q->reasons);
+  if (q->verdict == EP_MAP_GOOD) q->verdict = EP_MAP_DOUBTFUL;
+  snprintf(q->reasons + used, sizeof q->reasons - used,
+           "%s%d tet(s) of the transferred pose are inverted; use fewer eigenfunctions or a finer "
+           "object",
+           used ? "; " : "", q->inverted_left);
+}
+
+void ep_map_note_inverted(ep_map *map, int inverted, int left) {
+  map->quality.inverted = inverted;
+  map->quality.inverted_left = left;
+  weigh_inverted(&map->quality);
+}
+
 void ep_map_verdict(bool same_family, ep_map *map) {
   ep_map_quality *q = &map->quality;
   q->verdict = EP_MAP_GOOD;

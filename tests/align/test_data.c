@@ -107,7 +107,8 @@ static void measure(const data_set *d, const char *name, int m, table *t) {
     }
   for (int regions = 0; regions < 2; regions++) {
     ep_map composed;
-    if (ep_map_compose(&t->map[0][regions], &t->map[1][regions], &composed, &err) != EP_OK)
+    if (ep_map_compose(&t->map[0][regions], &d->s[1].mesh, &t->map[1][regions], &d->s[2].mesh,
+                       &composed, &err) != EP_OK)
       fail_msg("%s", err.text);
     t->composed[regions] = jaccard(d, 0, 2, composed.p);
     printf("%14s %-16s %-8s   %.3f\n", "", "composed", regions ? "regions" : "nothing",

@@ -273,7 +273,8 @@ static void other_resolutions_and_poses_stay_near_the_truth(void **state) {
   o.same_family = true;
   match(&rest.s, &pose.s, &o, &second);
   ep_error err = {0};
-  assert_int_equal(ep_map_compose(&first, &second, &composed, &err), EP_OK);
+  assert_int_equal(ep_map_compose(&first, &rest.s.mesh, &second, &pose.s.mesh, &composed, &err),
+                   EP_OK);
   const double e_remeshed = mean_error(&same, &rest, remeshed.p, place_club);
   const double e_first = mean_error(&object, &rest, first.p, place_fat_club);
   const double e_second = mean_error(&rest, &pose, second.p, place_club);
@@ -320,7 +321,7 @@ static void composition_multiplies(void **state) {
   ep_error err = {0};
   match(&a.s, &b, &o, &ab);
   match(&b, &c, &o, &bc);
-  assert_int_equal(ep_map_compose(&ab, &bc, &ac, &err), EP_OK);
+  assert_int_equal(ep_map_compose(&ab, &b.mesh, &bc, &c.mesh, &ac, &err), EP_OK);
   int wrong = 0;
   for (int i = 0; i < ac.n; i++) wrong += to_b[to_c[ac.p[i]]] != i;
   assert_int_equal(wrong, 0);
@@ -334,7 +335,7 @@ static void composition_multiplies(void **state) {
     }
   bc.m--;
   ep_map_free(&ac);
-  assert_int_equal(ep_map_compose(&ab, &bc, &ac, &err), EP_ERR_ARGUMENT);
+  assert_int_equal(ep_map_compose(&ab, &b.mesh, &bc, &c.mesh, &ac, &err), EP_ERR_ARGUMENT);
   assert_null(ac.p);
   bc.m++;
   ep_map_free(&ab);
