@@ -54,7 +54,7 @@ ep_status ep_bake_lb(ep_bake *bake, int shape, ep_error *err) {
 // ---- maps ------------------------------------------------------------------------------------
 
 // The numbers of a quality record in the order they are stored.
-enum { QUALITY_NUMBERS = 13, REGION_NUMBERS = 5, FRAME_NUMBERS = 7, REASONS = 512 };
+enum { QUALITY_NUMBERS = 13, REGION_NUMBERS = 5, FRAME_NUMBERS = 7, REASONS = 1024 };
 
 static void pack_quality(const ep_map_quality *q, double *out) {
   const double numbers[QUALITY_NUMBERS] = {
