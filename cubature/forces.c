@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "cubature/parallel.h"
+#include "reduced/reference.h"
 
 typedef struct create_work {
   ep_elements *elements;
@@ -52,14 +53,6 @@ static double determinant(const double f[9]) {
          f[2] * (f[3] * f[7] - f[4] * f[6]);
 }
 
-static void inverse(const double f[9], double det, double out[9]) {
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) {
-      const int a = (j + 1) % 3, b = (j + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
-      out[3 * i + j] = (f[3 * a + c] * f[3 * b + d] - f[3 * a + d] * f[3 * b + c]) / det;
-    }
-}
-
 // c = a b; c = a b^T.
 static void multiply(const double a[9], const double b[9], double c[9]) {
   for (int i = 0; i < 3; i++)
@@ -105,8 +98,9 @@ double ep_element_volume_ratio(const ep_elements *elements, int e, const ep_pose
   double f[9];
   const double det = ep_element_gradient(elements, e, pose->q, f);
   if (!pose->reference) return det;
+  double inverted[9];
   const double base_det = ep_element_gradient(elements, e, pose->reference, f);
-  return base_det >= EP_FLAT_REFERENCE ? det / base_det : 1;
+  return ep_reference_element(f, inverted) > 0 ? det / base_det : 1;
 }
 
 double ep_element_force(const ep_elements *elements, int e, const ep_pose *pose, double *out) {
@@ -120,15 +114,15 @@ double ep_element_force(const ep_elements *elements, int e, const ep_pose *pose,
   }
   double base[9], inverted[9], relative[9], pulled[9];
   const double base_det = ep_element_gradient(elements, e, pose->reference, base);
-  if (!(base_det >= EP_FLAT_REFERENCE)) {
+  const double weight = ep_reference_element(base, inverted);
+  if (!(weight > 0)) {
     memset(out, 0, (size_t)elements->r * sizeof *out);
     return 1;
   }
-  inverse(base, base_det, inverted);
   multiply(f, inverted, relative);
   ep_material_stress(fem->model, fem->lambda[e], fem->mu[e], relative, stress);
   multiply_nt(stress, inverted, pulled);
-  for (int i = 0; i < 9; i++) pulled[i] *= base_det;
+  for (int i = 0; i < 9; i++) pulled[i] *= weight;
   ep_element_pull_back(elements, e, pulled, out);
   return det / base_det;
 }

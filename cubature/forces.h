@@ -21,17 +21,14 @@ typedef struct ep_pose {
   const double *reference; // (r) the undeformed shape; NULL: rest
 } ep_pose;
 
-// Elements whose reference shape keeps less than this of its volume have no usable F_i^-1: they
-// give no force in poses relative to it.
-#define EP_FLAT_REFERENCE 0.05
-
 // F_e at q, row-major. Returns det F.
 double ep_element_gradient(const ep_elements *elements, int e, const double *q, double f[9]);
 
 // Generalised force of element e per unit of its rest volume (DESIGN "Cubature training"):
 //   rest:      G^T P(F)
-//   reference: |det F_i| G^T P(F F_i^-1) F_i^-T
-// into out (r). Returns det of F or of F F_i^-1; 1 and a zero force for a flat reference.
+//   reference: v_i G^T P(F F_i^-1) F_i^-T, v_i from ep_reference_element
+// into out (r). Returns det of F or of F F_i^-1; 1 and a zero force where the
+// reference shape has no usable element.
 double ep_element_force(const ep_elements *elements, int e, const ep_pose *pose, double *out);
 
 // The determinant ep_element_force would return.

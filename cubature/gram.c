@@ -48,28 +48,22 @@ static double dot(int n, const double *restrict a, const double *restrict b) {
   return (low[0] + low[1]) + (high[0] + high[1]);
 }
 
-typedef struct prepare_work {
-  ep_gram *gram;
-  const unsigned char *barred;
-} prepare_work;
-
 static void prepare_range(void *context, int piece, int from, int to) {
   (void)piece;
-  const prepare_work *w = context;
-  ep_gram *gram = w->gram;
+  ep_gram *gram = context;
   for (int e = from; e < to; e++) {
     double *a = gram->a + (size_t)e * (size_t)gram->stride;
     const double norm = sqrt(dot(gram->stride, a, a));
-    gram->norm[e] = w->barred && w->barred[e] ? 0 : norm;
-    const double scale = gram->norm[e] > 0 ? 1 / norm : 0;
+    gram->norm[e] = norm;
+    const double scale = norm > 0 ? 1 / norm : 0;
     if (isfinite(norm))
       for (int i = 0; i < gram->rows; i++) a[i] *= scale;
     gram->c[e] = dot(gram->stride, a, gram->b);
   }
 }
 
-ep_status ep_gram_prepare(ep_gram *gram, const unsigned char *barred, ep_error *err) {
-  ep_parallel_ranges(gram->n, prepare_range, &(prepare_work){gram, barred});
+ep_status ep_gram_prepare(ep_gram *gram, ep_error *err) {
+  ep_parallel_ranges(gram->n, prepare_range, gram);
   for (int e = 0; e < gram->n; e++)
     if (!isfinite(gram->norm[e]) || !isfinite(gram->c[e]))
       return ep_fail(err, EP_ERR_NUMERIC,

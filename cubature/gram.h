@@ -24,9 +24,9 @@ typedef struct ep_gram {
 ep_status ep_gram_create(int n, int rows, ep_gram *out, ep_error *err);
 void ep_gram_free(ep_gram *gram);
 
-// Scale the columns to unit length and compute c. barred (n) or NULL: != 0 takes a candidate out.
+// Scale the columns to unit length and compute c.
 // Errors: EP_ERR_NUMERIC for numbers that are not finite (message: element).
-ep_status ep_gram_prepare(ep_gram *gram, const unsigned char *barred, ep_error *err);
+ep_status ep_gram_prepare(ep_gram *gram, ep_error *err);
 
 // Make sure that the columns of G of these candidates are there.
 ep_status ep_gram_need(ep_gram *gram, int count, const int *candidate, ep_error *err);

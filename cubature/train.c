@@ -5,6 +5,7 @@
 #include "cubature/cubature.h"
 #include "cubature/select.h"
 #include "cubature/system.h"
+#include "reduced/reference.h"
 
 // The matrix of element forces may take this much memory; above, its rows are sketched, but to no
 // fewer than ROWS_PER_ELEMENT for each element wanted (DESIGN: about 5 s). On 30,481 tets, s = 60:
@@ -88,28 +89,23 @@ static ep_status make_poses(trainer *t, const ep_basis *basis, ep_error *err) {
   return ep_training_make(&t->elements, &t->held_poses, &t->held, err);
 }
 
-// Elements that an example has flattened or turned over cannot serve: their force relative to that
-// example does not exist.
-static ep_status bar_flat_elements(const trainer *t, const ep_basis *basis, unsigned char *barred,
-                                   ep_error *err) {
-  int count = 0, first = -1;
-  for (int e = 0; e < t->elements.nt; e++) {
-    for (int i = 0; i < basis->examples; i++) {
-      double f[9];
-      const double *q = basis->example_q + (size_t)i * (size_t)basis->r;
-      if (!(ep_element_gradient(&t->elements, e, q, f) >= EP_FLAT_REFERENCE)) barred[e] = 1;
+// Say how many elements an example has flattened or turned over: poses relative to that example
+// get no force from them.
+static void tell_flat_elements(const trainer *t, const ep_basis *basis) {
+  for (int i = 0; i < basis->examples; i++) {
+    int count = 0, first = -1;
+    for (int e = 0; e < t->elements.nt; e++) {
+      double f[9], inverse[9];
+      ep_element_gradient(&t->elements, e, basis->example_q + (size_t)i * (size_t)basis->r, f);
+      if (ep_reference_element(f, inverse) > 0) continue;
+      if (count++ == 0) first = e;
     }
-    if (barred[e] && first < 0) first = e;
-    count += barred[e];
+    if (count > 0)
+      ep_warn(t->log,
+              "cubature: example %d flattens or turns over %d of %d elements (first: tet %d); they "
+              "count for nothing in its energy",
+              i + 1, count, t->elements.nt, first);
   }
-  if (count == t->elements.nt)
-    return ep_fail(err, EP_ERR_NUMERIC, "cubature: the examples flatten every element");
-  if (count > 0)
-    ep_warn(t->log,
-            "cubature: %d of %d elements are flat or turned over in an example (first: tet %d) and "
-            "were left out",
-            count, t->elements.nt, first);
-  return EP_OK;
 }
 
 static int largest_set(const ep_cubature_options *o) {
@@ -129,15 +125,12 @@ static ep_status make_system(trainer *t, const ep_basis *basis, ep_error *err) {
   ep_random random = ep_random_seed(t->options->seed, STREAM_SKETCH);
   EP_TRY(ep_gram_create(t->elements.nt, rows, &t->gram, err));
   EP_TRY(ep_training_system(&t->training, &random, &t->gram, err));
-  unsigned char *barred = calloc((size_t)t->elements.nt, 1);
-  if (!barred) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d marks", t->elements.nt);
-  ep_status status = bar_flat_elements(t, basis, barred, err);
-  if (status == EP_OK) status = ep_gram_prepare(&t->gram, barred, err);
-  free(barred);
-  if (status == EP_OK && rows < t->poses.count * t->elements.r)
+  tell_flat_elements(t, basis);
+  EP_TRY(ep_gram_prepare(&t->gram, err));
+  if (rows < t->poses.count * t->elements.r)
     ep_notice(t->log, "cubature: %d equations sketched to %d", t->poses.count * t->elements.r,
               rows);
-  return status;
+  return EP_OK;
 }
 
 static ep_status make_sets(trainer *t, ep_error *err) {

@@ -1,16 +1,22 @@
 #include <math.h>
 #include <string.h>
 
+#include "reduced/reference.h"
 #include "reduced/state.h"
 
 double ep_evaluate(ep_state *state, int terms, const double *q, double *f, double *k, int project) {
+  return ep_evaluate_law(state, state->model->material, terms, q, f, k, project);
+}
+
+double ep_evaluate_law(ep_state *state, ep_material material, int terms, const double *q, double *f,
+                       double *k, int project) {
   const ep_model *m = state->model;
   const int r = m->size.r;
   memcpy(state->padded_q, q, (size_t)r * sizeof *q); // its tail stays zero
   ep_kernel_task task = {.r = r,
                          .s = m->size.s,
                          .blocks = m->size.blocks,
-                         .material = m->material,
+                         .material = material,
                          .g = m->cubature_g,
                          .lambda = m->cubature_lambda,
                          .mu = m->cubature_mu,
@@ -76,26 +82,13 @@ static void element_gradient(const ep_state *state, int e, double f[9]) {
   }
 }
 
-// A target element below this share of its volume (or inverted) cannot serve as undeformed shape:
-// its inverse would blow up the force. It is left out.
-static const double smallest_target_volume = 0.05;
-
 void ep_freeze_target(ep_state *state) {
   const ep_model *m = state->model;
   memcpy(state->padded_q, state->next_target, (size_t)m->size.r * sizeof(double));
   for (int e = 0; e < m->size.s; e++) {
-    double f[9], *b = state->target_inverse + 9 * e;
+    double f[9];
     element_gradient(state, e, f);
-    for (int i = 0; i < 3; i++) {
-      int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
-      for (int j = 0; j < 3; j++) { // transposed cofactors
-        int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-        b[3 * j + i] = f[3 * i1 + j1] * f[3 * i2 + j2] - f[3 * i1 + j2] * f[3 * i2 + j1];
-      }
-    }
-    double det = f[0] * b[0] + f[1] * b[3] + f[2] * b[6];
-    int usable = det > smallest_target_volume;
-    for (int c = 0; c < 9; c++) b[c] = usable ? b[c] / det : c % 4 == 0;
-    state->target_weight[e] = usable ? m->cubature_w[e] * det : 0;
+    state->target_weight[e] =
+        m->cubature_w[e] * ep_reference_element(f, state->target_inverse + 9 * e);
   }
 }

@@ -4,8 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// |det F| of an example below this is a flattened element: F^-1 would be mostly round-off.
-static const double FLAT = 1e-8;
+#include "reduced/reference.h"
 
 // The arrays while they are written; the model itself holds pointers to const.
 typedef struct arrays {
@@ -132,38 +131,19 @@ static void element_gradient(const builder *b, int e, double *g) {
       }
 }
 
-static ep_status invert3(const double f[9], double inverse[9], double *det) {
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) { // cofactor of (j, i)
-      const int r1 = (j + 1) % 3, r2 = (j + 2) % 3, c1 = (i + 1) % 3, c2 = (i + 2) % 3;
-      inverse[3 * i + j] = f[3 * r1 + c1] * f[3 * r2 + c2] - f[3 * r1 + c2] * f[3 * r2 + c1];
-    }
-  *det = f[0] * inverse[0] + f[1] * inverse[3] + f[2] * inverse[6];
-  if (!(fabs(*det) > FLAT)) return EP_ERR_NUMERIC;
-  for (int i = 0; i < 9; i++) inverse[i] /= *det;
-  return EP_OK;
-}
-
-static ep_status example_at_element(builder *b, int example, int j, const double *g,
-                                    ep_error *err) {
+static void example_at_element(builder *b, int example, int j, const double *g) {
   const int r = b->size.r, s = b->size.s;
   const double *q = b->a.example_q + (size_t)example * (size_t)r;
   const size_t at = (size_t)example * (size_t)s + (size_t)j;
-  double f[9], det;
+  double f[9];
   for (int i = 0; i < 9; i++) {
     f[i] = i % 4 == 0;
     for (int a = 0; a < r; a++) f[i] += g[(size_t)i * (size_t)r + (size_t)a] * q[a];
   }
-  if (invert3(f, b->a.example_finv + 9 * at, &det) != EP_OK)
-    return ep_fail(err, EP_ERR_NUMERIC,
-                   "example %d flattens tet %d of the object (volume ratio %g): use fewer "
-                   "eigenfunctions or repair the example",
-                   example + 1, b->parts->tet[j], det);
-  b->a.example_w[at] = b->parts->weight[j] * fabs(det);
-  return EP_OK;
+  b->a.example_w[at] = b->parts->weight[j] * ep_reference_element(f, b->a.example_finv + 9 * at);
 }
 
-static ep_status fill_cubature(builder *b, double *g, ep_error *err) {
+static void fill_cubature(builder *b, double *g) {
   const ep_model_parts *p = b->parts;
   for (int j = 0; j < p->s; j++) {
     double *gj = g + (size_t)j * 9 * (size_t)b->size.r;
@@ -172,18 +152,17 @@ static ep_status fill_cubature(builder *b, double *g, ep_error *err) {
     b->a.cubature_w[j] = p->weight[j];
     b->a.cubature_lambda[j] = p->fem->lambda[p->tet[j]];
     b->a.cubature_mu[j] = p->fem->mu[p->tet[j]];
-    for (int i = 0; i < b->size.k; i++) EP_TRY(example_at_element(b, i, j, gj, err));
+    for (int i = 0; i < b->size.k; i++) example_at_element(b, i, j, gj);
   }
   ep_pack_cubature(b->size.r, b->size.s, g, b->a.cubature_g);
-  return EP_OK;
 }
 
 static ep_status build_cubature(builder *b, ep_error *err) {
   double *g = malloc((size_t)b->size.s * 9 * (size_t)b->size.r * sizeof *g);
   if (!g) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d cubature elements", b->size.s);
-  ep_status status = fill_cubature(b, g, err);
+  fill_cubature(b, g);
   free(g);
-  return status;
+  return EP_OK;
 }
 
 static ep_model_sizes sizes_of(const ep_model_parts *p) {

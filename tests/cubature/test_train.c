@@ -306,7 +306,7 @@ static void test_sketch(void **state) {
     double weight[30];
     ASSERT_OK(ep_gram_create(f.elements.nt, sketched ? 300 : 150 * R, &gram, err));
     ASSERT_OK(ep_training_system(&training, &rng, &gram, err));
-    ASSERT_OK(ep_gram_prepare(&gram, NULL, err));
+    ASSERT_OK(ep_gram_prepare(&gram, err));
     ASSERT_OK(ep_passive_create(30, &set, err));
     ASSERT_OK(ep_select_grow(&gram, &(ep_growth){.shortlist = 64}, 30, &set, err));
     ASSERT_OK(ep_training_refit(&training, set.count, set.index, weight, err));
@@ -370,7 +370,8 @@ static void test_train(void **state) {
   free_fixture(&f);
 }
 
-// An example with a vertex pushed through its tets: these are never chosen, and it is said.
+// An example with a vertex pushed through its tets: they count for nothing in poses relative to it,
+// and it is said.
 static void test_inverted_example(void **state) {
   (void)state;
   bar b;
@@ -390,11 +391,8 @@ static void test_inverted_example(void **state) {
   ep_cubature c;
   ASSERT_OK(ep_cubature_train(&f.b.fem, &f.basis, &o, &log, &c, err));
   assert_int_equal(log.warnings, 1);
-  for (int j = 0; j < c.count; j++) {
-    double gradient[9];
-    assert_true(ep_element_gradient(&f.elements, c.tet[j], f.basis.example_q, gradient) >=
-                EP_FLAT_REFERENCE);
-  }
+  // A sound example gives .05 here: the ruined elements must not spoil the others' forces.
+  ASSERT_LESS(c.held_out_error, 0.15);
   ep_cubature_free(&c);
   free_fixture(&f);
 }
