@@ -4,6 +4,8 @@
 #ifndef EP_LINALG_PETSC_H
 #define EP_LINALG_PETSC_H
 
+#include <stddef.h>
+
 #include "base/error.h"
 #include "base/log.h"
 #include "linalg/sparse.h"
@@ -26,6 +28,8 @@ ep_status ep_factor_create(const ep_csr *a, const unsigned char *held, int defin
 ep_status ep_factor_update(ep_factor *f, const ep_csr *a, ep_error *err);
 // x = A^-1 b; b, x (n x width interleaved), may alias. Width > 1 solves component by component.
 ep_status ep_factor_solve(ep_factor *f, int width, const double *b, double *x, ep_error *err);
+// Memory of the factor's entries on this rank's machine [bytes].
+size_t ep_factor_bytes(const ep_factor *f);
 void ep_factor_free(ep_factor *f);
 
 // The `count` eigenpairs of K x = lambda M x nearest above `shift` (shift-invert with Cholesky;

@@ -174,6 +174,14 @@ ep_status ep_factor_solve(ep_factor *f, int width, const double *b, double *x, e
   return ep_petsc_status(solve(f, width, b, x), "sparse solve", err);
 }
 
+// MUMPS' INFOG(29): entries in the factors over all ranks; in millions where negative.
+size_t ep_factor_bytes(const ep_factor *f) {
+  PetscInt entries = 0;
+  if (MatMumpsGetInfog(f->factor, 29, &entries)) return 0;
+  const double count = entries < 0 ? -1e6 * (double)entries : (double)entries;
+  return (size_t)count * sizeof(double);
+}
+
 void ep_factor_free(ep_factor *f) {
   if (!f) return;
   MatDestroy(&f->rhs);

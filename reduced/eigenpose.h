@@ -120,6 +120,8 @@ typedef struct ep_step_def {
   int max_iterations;      // Newton iterations (50)
 } ep_step_def;
 ep_step_def ep_default_step(void);
+// 1 where ep_step accepts it: made by ep_default_step, every number finite and in range.
+int ep_step_def_valid(const ep_step_def *def);
 
 typedef struct ep_step_report {
   int newton_iterations, line_search_steps, projections; // projections: Cholesky failed, fell back

@@ -106,7 +106,9 @@ ep_status ep_newton_minimise(ep_state *state, ep_newton *newton) {
     ep_solve_lower_transposed(r, state->factor, state->direction);
     double slope = ep_dot(r, state->g, state->direction);
     if (!(slope < 0)) return EP_ERR_NUMERIC;
-    double noise = 1e-13 * (fabs(newton->energy_now) + fabs(slope));
+    // Strains are known to 1e-16, energies ~ strain^2 therefore to 1e-16 sqrt(energy at strain 1).
+    double noise = 1e-13 * (fabs(newton->energy_now) + fabs(slope)) +
+                   1e-15 * sqrt(fabs(newton->energy_now) * state->energy_scale);
     double strain = state->strain_scale * sqrt(ep_dot(r, state->direction, state->direction));
     double step = line_search(state, newton, slope, noise);
     if (strain <= (step > 0 ? tiny_strain : small_strain)) break; // nothing left but round-off

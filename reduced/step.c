@@ -19,7 +19,7 @@ ep_step_def ep_default_step(void) {
                        .max_iterations = 50};
 }
 
-static int valid(const ep_step_def *d) {
+int ep_step_def_valid(const ep_step_def *d) {
   return d->cookie == COOKIE && d->dt > 0 && isfinite(d->dt) && d->damping_mass >= 0 &&
          isfinite(d->damping_mass) && d->damping_stiffness >= 0 && isfinite(d->damping_stiffness) &&
          d->strength >= 0 && isfinite(d->strength) && d->tolerance > 0 && d->target_tolerance > 0 &&
@@ -156,7 +156,7 @@ ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *repor
   ep_step_report unused;
   if (!report) report = &unused;
   *report = (ep_step_report){0};
-  if (!valid(def)) return EP_ERR_ARGUMENT;
+  if (!ep_step_def_valid(def)) return EP_ERR_ARGUMENT;
   step s = {.state = state, .def = def, .examples = state->model->size.k > 0 && def->strength > 0};
   if (s.examples) {
     ep_status status = ep_find_target(state, def, &report->target);
@@ -204,7 +204,7 @@ ep_status ep_interpolate(ep_state *state, const ep_step_def *def, ep_target_repo
   ep_target_report unused;
   if (!report) report = &unused;
   *report = (ep_target_report){0};
-  if (!valid(def)) return EP_ERR_ARGUMENT;
+  if (!ep_step_def_valid(def)) return EP_ERR_ARGUMENT;
   if (state->model->size.k == 0) return EP_OK;
   ep_status status = ep_find_target(state, def, report);
   if (status == EP_OK) ep_commit_target(state);
