@@ -11,8 +11,13 @@
 
 // What an example's pose on the object's mesh is worth.
 typedef struct ep_pose_quality {
-  double iterations, inverted_tets, worst_volume_ratio, coefficient_error; // of LB-ARAP
+  double iterations, coefficient_error; // of LB-ARAP
   double fixed_shift; // how far the fixed vertices had to be brought back / diagonal (rms)
+  // before and after repair; crushed: less volume than 5 % of rest, inverted ones counted too
+  double inverted_before, inverted_tets, crushed_before, crushed_tets;
+  double worst_before, worst_volume_ratio; // smallest volume of a tet over that at rest
+  double repair_moved, repair_moved_most;  // rms and largest move by the repair / diagonal
+  double repair_shift;                     // of the low coefficients by the repair, relative
 } ep_pose_quality;
 
 typedef struct ep_bake {
@@ -21,6 +26,7 @@ typedef struct ep_bake {
   ep_plan *plan; // cached and seconds of its stages are filled in
   const ep_cache *cache;
   ep_log *log;
+  bool look;  // only to be looked at: bad maps and poses do not stop; poses are not stored
   bool petsc; // started by the first stage that is computed
   // results so far; zero until needed
   ep_lb *lb;                // (shapes->count)
@@ -44,7 +50,8 @@ void ep_bake_close(ep_bake *bake);
 ep_status ep_bake_lb(ep_bake *bake, int shape, ep_error *err);
 // *out is borrowed. A bad map is no error here.
 ep_status ep_bake_map(ep_bake *bake, ep_stage *stage, const ep_map **out, ep_error *err);
-// EP_ERR_MATCH where a map is bad and the family does not accept it.
+// EP_ERR_MATCH where a map is bad, or a pose keeps inverted tets or moves what is fixed, and the
+// family does not accept it.
 ep_status ep_bake_poses(ep_bake *bake, ep_error *err);
 ep_status ep_bake_fem(ep_bake *bake, ep_error *err);
 ep_status ep_bake_modes(ep_bake *bake, ep_error *err);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "app/bake.h"
+#include "app/map_store.h"
 
 // ---- LB spaces -------------------------------------------------------------------------------
 
@@ -52,123 +53,6 @@ ep_status ep_bake_lb(ep_bake *bake, int shape, ep_error *err) {
 }
 
 // ---- maps ------------------------------------------------------------------------------------
-
-// The numbers of a quality record in the order they are stored.
-enum { QUALITY_NUMBERS = 13, REGION_NUMBERS = 5, FRAME_NUMBERS = 7, REASONS = 1024 };
-
-static void pack_quality(const ep_map_quality *q, double *out) {
-  const double numbers[QUALITY_NUMBERS] = {
-      q->verdict,
-      q->residual_before,
-      q->residual_after,
-      q->orthogonality,
-      q->determinant,
-      q->coverage,
-      q->cycle,
-      q->dirichlet,
-      q->near_multiple,
-      q->reframe_rounds,
-      q->frame_angle,
-      q->regions,
-      0,
-  };
-  memcpy(out, numbers, sizeof numbers);
-}
-
-static void unpack_quality(const double *in, ep_map_quality *q) {
-  q->verdict = (ep_verdict)(int)in[0];
-  q->residual_before = in[1];
-  q->residual_after = in[2];
-  q->orthogonality = in[3];
-  q->determinant = in[4];
-  q->coverage = in[5];
-  q->cycle = in[6];
-  q->dirichlet = in[7];
-  q->near_multiple = (int)in[8];
-  q->reframe_rounds = (int)in[9];
-  q->frame_angle = in[10];
-  q->regions = (int)in[11];
-}
-
-static void pack_region(const ep_region_quality *r, double *out) {
-  out[0] = r->residual_before;
-  out[1] = r->residual_after;
-  out[2] = r->jaccard;
-  out[3] = r->best_match;
-  out[4] = r->suspect;
-}
-
-static void unpack_region(const double *in, ep_region_quality *r) {
-  r->residual_before = in[0];
-  r->residual_after = in[1];
-  r->jaccard = in[2];
-  r->best_match = (int)in[3];
-  r->suspect = in[4] != 0;
-}
-
-static bool take_regions(const ep_bake_step *step, ep_map_quality *q) {
-  double *numbers;
-  const size_t count = (size_t)q->regions;
-  if (!count) return true;
-  if (count > 100000 || !ep_bake_take(step, "regions", count * REGION_NUMBERS, &numbers))
-    return false;
-  q->region = calloc(count, sizeof *q->region);
-  for (size_t i = 0; q->region && i < count; i++)
-    unpack_region(numbers + REGION_NUMBERS * i, &q->region[i]);
-  free(numbers);
-  return q->region != NULL;
-}
-
-static bool take_map(const ep_bake_step *step, int n, int vertices_to, ep_map *map) {
-  const size_t m = (size_t)step->stage->functions;
-  const double *rotation = ep_artifact_array(&step->artifact, "rotation", EP_F64, 9);
-  const double *frame = ep_artifact_array(&step->artifact, "frame", EP_F64, FRAME_NUMBERS);
-  const double *quality = ep_artifact_array(&step->artifact, "quality", EP_F64, QUALITY_NUMBERS);
-  const char *reasons = ep_artifact_array(&step->artifact, "reasons", EP_U8, REASONS);
-  if (!rotation || !frame || !quality || !reasons) return false;
-  map->n = n;
-  map->m = (int)m;
-  unpack_quality(quality, &map->quality);
-  memcpy(map->quality.reasons, reasons, REASONS - 1);
-  memcpy(map->rotation, rotation, sizeof map->rotation);
-  map->scale = frame[0];
-  memcpy(map->center_from, frame + 1, sizeof map->center_from);
-  memcpy(map->center_to, frame + 4, sizeof map->center_to);
-  bool good = ep_bake_take_int(step, "p", (size_t)n, &map->p) &&
-              ep_bake_take(step, "c", m * m, &map->c) && ep_bake_take(step, "a", m * m, &map->a) &&
-              take_regions(step, &map->quality);
-  for (int v = 0; good && v < n; v++) good = map->p[v] >= 0 && map->p[v] < vertices_to;
-  if (!good) ep_map_free(map);
-  return good;
-}
-
-static ep_status store_map(const ep_bake *bake, const ep_stage *stage, const ep_map *map,
-                           ep_error *err) {
-  const ep_map_quality *q = &map->quality;
-  double quality[QUALITY_NUMBERS], frame[FRAME_NUMBERS] = {map->scale};
-  char reasons[REASONS] = "";
-  double *regions = calloc((size_t)q->regions * REGION_NUMBERS + 1, sizeof *regions);
-  if (!regions) return ep_fail(err, EP_ERR_MEMORY, "no memory for the regions of a map");
-  for (int i = 0; i < q->regions; i++) pack_region(&q->region[i], regions + REGION_NUMBERS * i);
-  pack_quality(q, quality);
-  snprintf(reasons, sizeof reasons, "%s", q->reasons);
-  memcpy(frame + 1, map->center_from, sizeof map->center_from);
-  memcpy(frame + 4, map->center_to, sizeof map->center_to);
-  const ep_tensor tensors[] = {
-      ep_tensor_of("p", EP_I32, map->p, map->n, 0, 0),
-      ep_tensor_of("c", EP_F64, map->c, map->m, map->m, 0),
-      ep_tensor_of("a", EP_F64, map->a, map->m, map->m, 0),
-      ep_tensor_of("rotation", EP_F64, map->rotation, 9, 0, 0),
-      ep_tensor_of("frame", EP_F64, frame, FRAME_NUMBERS, 0, 0),
-      ep_tensor_of("quality", EP_F64, quality, QUALITY_NUMBERS, 0, 0),
-      ep_tensor_of("reasons", EP_U8, reasons, REASONS, 0, 0),
-      ep_tensor_of("regions", EP_F64, regions, q->regions, REGION_NUMBERS, 0),
-  };
-  const ep_status status = ep_cache_store(bake->cache, stage->name, &stage->key, q->regions ? 8 : 7,
-                                          tensors, 0, NULL, err);
-  free(regions);
-  return status;
-}
 
 // Columns of a regions file: the object, the family's rest shape where it has one of its own, then
 // its poses in order.
@@ -221,7 +105,7 @@ static ep_status compute_map(ep_bake *bake, ep_bake_step *step, ep_map *map, ep_
                        &bake->mass[stage->to]};
   ep_status status = ep_bake_compute(bake, step, err);
   if (status == EP_OK) status = ep_map_match(&from, &to, &options, bake->log, map, err);
-  if (status == EP_OK) status = store_map(bake, stage, map, err);
+  if (status == EP_OK) status = ep_map_store(bake->cache, stage->name, &stage->key, map, err);
   ep_regions_free(&regions);
   return status;
 }
@@ -233,8 +117,8 @@ ep_status ep_bake_map(ep_bake *bake, ep_stage *stage, const ep_map **out, ep_err
   ep_bake_step step;
   ep_status status = EP_OK;
   ep_bake_begin(bake, stage, &step);
-  if (step.found && !take_map(&step, bake->shapes->shape[stage->from].mesh.nv,
-                              bake->shapes->shape[stage->to].mesh.nv, map))
+  if (step.found && !ep_map_take(&step.artifact, bake->shapes->shape[stage->from].mesh.nv,
+                                 stage->functions, &bake->shapes->shape[stage->to].mesh, map))
     ep_bake_reject(bake, &step);
   if (!step.found) status = compute_map(bake, &step, map, err);
   ep_bake_end(&step);

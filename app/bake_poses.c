@@ -1,5 +1,6 @@
 // Example poses on the object's mesh (DESIGN "Descriptors", "Example poses on the object's mesh").
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -51,15 +52,17 @@ static double shift_of(const ep_shapes *shapes, const double *u) {
 }
 
 // Displacement of the pose against its rest shape at the rest shape's vertices, out (n x 3), after
-// the best rotation of the pose onto the rest. p: rest vertex -> pose vertex, NULL: the same.
-static ep_status pose_minus_rest(const ep_mesh *rest, const ep_mesh *pose, const int *p,
+// the best rotation of the pose onto the rest. map: rest -> pose, NULL: vertices correspond.
+static ep_status pose_minus_rest(const ep_mesh *rest, const ep_mesh *pose, const ep_map *map,
                                  double *out, ep_error *err) {
   const size_t n = (size_t)rest->nv;
   double *weight = malloc(n * sizeof *weight), r[9], cp[3], cr[3];
   if (!weight) return no_memory(err);
   ep_mesh_vertex_volumes(rest, weight);
-  for (size_t v = 0; v < n; v++)
-    memcpy(out + 3 * v, pose->x + 3 * (p ? (size_t)p[v] : v), 3 * sizeof *out);
+  if (map)
+    ep_map_pull(map, pose, 3, pose->x, out);
+  else
+    memcpy(out, pose->x, 3 * n * sizeof *out);
   const ep_status status = ep_kabsch(rest->nv, out, rest->x, weight, r, cp, cr, err);
   free(weight);
   if (status != EP_OK) return status;
@@ -72,15 +75,19 @@ static ep_status pose_minus_rest(const ep_mesh *rest, const ep_mesh *pose, const
   return EP_OK;
 }
 
-// Pull a field on the rest shape back to the object: u[v] = scale R field[p[v]].
-static void pull_back(int n, const ep_map *map, double scale, const double *field, double *u) {
+// Pull a field on the rest shape back to the object: u[v] = scale R field(image of v).
+static void pull_back(const ep_mesh *object, const ep_mesh *rest, const ep_map *map, double scale,
+                      const double *field, double *u) {
   static const double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   const double *r = map ? map->rotation : identity;
-  for (int v = 0; v < n; v++) {
-    const double *d = field + 3 * (size_t)(map ? map->p[v] : v);
-    for (int a = 0; a < 3; a++)
-      u[3 * (size_t)v + (size_t)a] =
-          scale * (r[3 * a] * d[0] + r[3 * a + 1] * d[1] + r[3 * a + 2] * d[2]);
+  if (map)
+    ep_map_pull(map, rest, 3, field, u);
+  else
+    memcpy(u, field, 3 * (size_t)object->nv * sizeof *u);
+  for (size_t v = 0; v < (size_t)object->nv; v++) {
+    const double d[3] = {u[3 * v], u[3 * v + 1], u[3 * v + 2]};
+    for (size_t a = 0; a < 3; a++)
+      u[3 * v + a] = scale * (r[3 * a] * d[0] + r[3 * a + 1] * d[1] + r[3 * a + 2] * d[2]);
   }
 }
 
@@ -88,13 +95,16 @@ static ep_status judge(const ep_bake *bake, const ep_stage *stage, const ep_map 
                        ep_error *err) {
   const ep_family *family = &bake->scene->family[stage->family];
   if (map->quality.verdict == EP_MAP_GOOD) return EP_OK;
-  if (map->quality.verdict == EP_MAP_BAD && !family->accept)
+  if (map->quality.verdict == EP_MAP_BAD && !family->accept && !bake->look)
     return ep_fail(err, EP_ERR_MATCH,
                    "%s: the map is bad: %s. Look at it with 'eigenpose align', or go on with "
                    "map: {accept: true} in family '%s'",
                    stage->name, map->quality.reasons, family->name);
   ep_warn(bake->log, "%s: the map is %s: %s", stage->name,
-          map->quality.verdict == EP_MAP_BAD ? "bad (accepted)" : "doubtful", map->quality.reasons);
+          map->quality.verdict == EP_MAP_DOUBTFUL ? "doubtful"
+          : family->accept                        ? "bad (accepted)"
+                                                  : "bad",
+          map->quality.reasons);
   return EP_OK;
 }
 
@@ -113,10 +123,10 @@ static ep_status transfer(ep_bake *bake, const ep_pose_source *example, double *
   if (!example->pose_same) EP_TRY(get_map(bake, example->rest, example->shape, &to_pose, err));
   double *field = malloc(3 * (size_t)rest->nv * sizeof *field);
   if (!field) return no_memory(err);
-  const ep_status status = pose_minus_rest(rest, &bake->shapes->shape[example->shape].mesh,
-                                           to_pose ? to_pose->p : NULL, field, err);
+  const ep_status status =
+      pose_minus_rest(rest, &bake->shapes->shape[example->shape].mesh, to_pose, field, err);
   const double scale = cbrt(ep_mesh_volume(object) / ep_mesh_volume(rest));
-  if (status == EP_OK) pull_back(object->nv, to_rest, scale, field, u);
+  if (status == EP_OK) pull_back(object, rest, to_rest, scale, field, u);
   free(field);
   return status;
 }
@@ -131,27 +141,15 @@ static ep_status hold_rigidly(const ep_shapes *shapes, double *u, ep_error *err)
   return EP_OK;
 }
 
-static ep_status count_inverted(const ep_mesh *mesh, const double *u, ep_pose_quality *quality,
-                                ep_error *err) {
-  const size_t n3 = 3 * (size_t)mesh->nv;
-  double *x = malloc(n3 * sizeof *x);
-  if (!x) return no_memory(err);
-  for (size_t i = 0; i < n3; i++) x[i] = mesh->x[i] + u[i];
-  quality->inverted_tets = ep_mesh_inverted(mesh, x, &quality->worst_volume_ratio);
-  free(x);
-  return EP_OK;
-}
-
 // A pose on the object's own connectivity: the fixed vertices are set to rest exactly.
 static ep_status pose_direct(ep_bake *bake, const ep_pose_source *example, double *u,
                              ep_pose_quality *quality, ep_error *err) {
-  const ep_mesh *mesh = &bake->shapes->shape[0].mesh;
   EP_TRY(transfer(bake, example, u, err));
   EP_TRY(hold_rigidly(bake->shapes, u, err));
   quality->fixed_shift = shift_of(bake->shapes, u);
   for (int i = 0; i < bake->shapes->nfixed; i++)
     memset(u + 3 * (size_t)bake->shapes->fixed[i], 0, 3 * sizeof *u);
-  return count_inverted(mesh, u, quality, err);
+  return EP_OK;
 }
 
 // A pose of another mesh: its low coefficients d, the rest as rigid as possible. The rigid motion
@@ -181,8 +179,6 @@ static ep_status pose_mapped(ep_bake *bake, const ep_pose_source *example,
     status = ep_lb_pose(mesh, &low, d, &options, u, &report, err);
     if (status == EP_OK) {
       quality->iterations = report.iterations;
-      quality->inverted_tets = report.inverted_tets;
-      quality->worst_volume_ratio = report.worst_volume_ratio;
       quality->coefficient_error = report.coefficient_error;
     }
   }
@@ -190,24 +186,82 @@ static ep_status pose_mapped(ep_bake *bake, const ep_pose_source *example,
   return status;
 }
 
-static ep_status report_pose(const ep_bake *bake, int index, ep_error *err) {
-  const ep_pose_quality *q = &bake->quality[index];
+// Say what is wrong with a pose: an error, or a warning where it was accepted beforehand or is only
+// being looked at.
+static ep_status complain(const ep_bake *bake, int index, ep_error *err, const char *text) {
+  const ep_family *family = &bake->scene->family[bake->shapes->example[index].family];
   const char *name = bake->shapes->shape[bake->shapes->example[index].shape].name;
-  if (q->fixed_shift > shift_refused)
-    return ep_fail(err, EP_ERR_MATCH,
-                   "example %s: the fixed vertices would move by %.2g of the diagonal (rms) in it; "
-                   "hold what stands still in the pose, or make a pose that holds them",
-                   name, q->fixed_shift);
+  if (!family->accept && !bake->look)
+    return ep_fail(err, EP_ERR_MATCH, "example %s: %s, or go on with map: {accept: true}", name,
+                   text);
+  ep_warn(bake->log, "example %s: %s%s", name, text, family->accept ? " (accepted)" : "");
+  return EP_OK;
+}
+
+static ep_status report_shift(const ep_bake *bake, int index, ep_error *err) {
+  const ep_pose_quality *q = &bake->quality[index];
+  char text[320];
+  if (q->fixed_shift > shift_refused) {
+    snprintf(text, sizeof text,
+             "the fixed vertices would move by %.2g of the diagonal (rms) in it; hold what stands "
+             "still in the pose, or make a pose that holds them",
+             q->fixed_shift);
+    return complain(bake, index, err, text);
+  }
   if (q->fixed_shift > shift_doubtful)
     ep_warn(bake->log,
             "example %s moves the fixed vertices by %.2g of the diagonal (rms); they "
             "are held at rest and the pose gives way there",
-            name, q->fixed_shift);
-  if (q->inverted_tets > 0)
+            bake->shapes->shape[bake->shapes->example[index].shape].name, q->fixed_shift);
+  return EP_OK;
+}
+
+static ep_status report_tets(const ep_bake *bake, int index, ep_error *err) {
+  const ep_pose_quality *q = &bake->quality[index];
+  const char *name = bake->shapes->shape[bake->shapes->example[index].shape].name;
+  char text[320];
+  if (q->inverted_tets > 0) {
+    snprintf(text, sizeof text,
+             "%.0f tets stay inverted on the object's mesh after repair (%.0f before; smallest "
+             "volume %.2g of rest); look at the map and the pose with 'eigenpose align', give a "
+             "milder pose or other eigenfunctions",
+             q->inverted_tets, q->inverted_before, q->worst_volume_ratio);
+    return complain(bake, index, err, text);
+  }
+  if (q->crushed_tets > 0)
     ep_warn(bake->log,
-            "example %s: %.0f tets are inverted on the object's mesh (smallest volume "
-            "%.2g of rest)",
-            name, q->inverted_tets, q->worst_volume_ratio);
+            "example %s: %.0f tets stay crushed (smallest volume %.2g of rest); they cannot serve "
+            "as cubature elements",
+            name, q->crushed_tets, q->worst_volume_ratio);
+  else if (q->crushed_before > 0)
+    ep_notice(bake->log,
+              "example %s: %.0f inverted and %.0f crushed tets repaired; vertices moved by %.1e of "
+              "the diagonal (rms, %.1e at most)",
+              name, q->inverted_before, q->crushed_before - q->inverted_before, q->repair_moved,
+              q->repair_moved_most);
+  return EP_OK;
+}
+
+// Inverted and crushed tets are given volume back, the low coefficients kept.
+static ep_status repair_pose(ep_bake *bake, const ep_pose_source *example,
+                             const unsigned char *held, double *u, ep_pose_quality *quality,
+                             ep_error *err) {
+  const bool mapped = example->route == EP_ROUTE_MAP;
+  ep_repair_options options = ep_default_repair_options();
+  ep_repair_report report;
+  options.m = mapped ? bake->scene->eigenfunctions : 0;
+  options.held = held;
+  EP_TRY(ep_lb_repair(&bake->shapes->shape[0].mesh, mapped ? &bake->lb[0] : NULL, &options, u,
+                      &report, err));
+  quality->inverted_before = report.inverted_before;
+  quality->inverted_tets = report.inverted_after;
+  quality->crushed_before = report.crushed_before;
+  quality->crushed_tets = report.crushed_after;
+  quality->worst_before = report.worst_before;
+  quality->worst_volume_ratio = report.worst_after;
+  quality->repair_moved = report.moved;
+  quality->repair_moved_most = report.moved_most;
+  quality->repair_shift = report.coefficient_shift;
   return EP_OK;
 }
 
@@ -218,9 +272,11 @@ static ep_status make_pose(ep_bake *bake, int index, const unsigned char *held, 
   const ep_status status = example->route == EP_ROUTE_SAME
                                ? pose_direct(bake, example, u, quality, err)
                                : pose_mapped(bake, example, held, u, quality, err);
+  if (status == EP_OK) EP_TRY(repair_pose(bake, example, held, u, quality, err));
   if (status != EP_OK)
     return ep_fail_context(err, "example %s", bake->shapes->shape[example->shape].name);
-  return report_pose(bake, index, err);
+  EP_TRY(report_shift(bake, index, err));
+  return report_tets(bake, index, err);
 }
 
 enum { POSE_NUMBERS = sizeof(ep_pose_quality) / sizeof(double) };
@@ -257,7 +313,7 @@ static ep_status compute_poses(ep_bake *bake, ep_bake_step *step, ep_error *err)
   }
   ep_progress_end(bake->log);
   free(held);
-  if (status != EP_OK) return status;
+  if (status != EP_OK || bake->look) return status;
   const ep_tensor tensors[] = {
       ep_tensor_of("u", EP_F64, bake->poses, (int64_t)k, (int64_t)(3 * n), 0),
       ep_tensor_of("quality", EP_F64, bake->quality, (int64_t)k, POSE_NUMBERS, 0),

@@ -164,14 +164,11 @@ static ep_status command_align(const ep_cli *cli, ep_session *session, ep_bake *
 static json_t *examples_json(const ep_bake *bake) {
   json_t *list = json_array();
   for (int i = 0; list && bake->quality && i < bake->shapes->examples; i++) {
-    const ep_pose_quality *q = &bake->quality[i];
-    const ep_pose_source *example = &bake->shapes->example[i];
-    json_array_append_new(list, json_pack("{s:s, s:f, s:o, s:o, s:o}", "name",
-                                          bake->shapes->shape[example->shape].name, "inverted_tets",
-                                          q->inverted_tets, "worst_volume_ratio",
-                                          ep_json_number(q->worst_volume_ratio),
-                                          "coefficient_error", ep_json_number(q->coefficient_error),
-                                          "fixed_shift", ep_json_number(q->fixed_shift)));
+    json_t *pose = ep_pose_json(&bake->quality[i]);
+    if (!pose) break;
+    json_object_set_new(pose, "name",
+                        json_string(bake->shapes->shape[bake->shapes->example[i].shape].name));
+    json_array_append_new(list, pose);
   }
   return list;
 }

@@ -10,7 +10,7 @@
 // Raised whenever a stage computes something else from the same input: old results are then not
 // found any more.
 static const int stage_version[] = {
-    [EP_STAGE_EIGEN] = 1,    [EP_STAGE_MAP] = 1,   [EP_STAGE_POSES] = 1,
+    [EP_STAGE_EIGEN] = 1,    [EP_STAGE_MAP] = 2,   [EP_STAGE_POSES] = 2,
     [EP_STAGE_MODES] = 1,    [EP_STAGE_PATHS] = 1, [EP_STAGE_BASIS] = 1,
     [EP_STAGE_CUBATURE] = 1, [EP_STAGE_MODEL] = 1, [EP_STAGE_TARGET] = 1,
 };
@@ -194,6 +194,9 @@ static void plan_poses(planner *p) {
     const ep_pose_source *e = &shapes->example[i];
     ep_hash_add(&text, "%d %s %s %s", (int)e->route, shapes->shape[0].geometry.hex,
                 shapes->shape[e->rest].geometry.hex, shapes->shape[e->shape].geometry.hex);
+    // A bad map stops the poses where it is not accepted: what was made by accepting it must not
+    // be found when it is not.
+    ep_hash_add(&text, "accept %d", (int)p->scene->family[e->family].accept);
     if (e->route == EP_ROUTE_SAME) continue;
     ep_hash_add(&text, "lb %s", ep_plan_eigen(p->plan, 0)->key.hex);
     if (!e->rest_same) ep_hash_add(&text, "rest %s", ep_plan_map(p->plan, 0, e->rest)->key.hex);

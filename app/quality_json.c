@@ -65,3 +65,37 @@ void ep_quality_text(FILE *out, const char *name, const ep_map_quality *q) {
             r->jaccard, r->best_match + 1, r->suspect ? "  suspect" : "");
   }
 }
+
+json_t *ep_pose_json(const ep_pose_quality *q) {
+  json_t *object = json_object();
+  const struct {
+    const char *key;
+    double value;
+  } numbers[] = {
+      {"inverted_tets", q->inverted_tets},
+      {"inverted_before_repair", q->inverted_before},
+      {"crushed_tets", q->crushed_tets},
+      {"crushed_before_repair", q->crushed_before},
+      {"worst_volume_ratio", q->worst_volume_ratio},
+      {"worst_volume_ratio_before_repair", q->worst_before},
+      {"repair_moved", q->repair_moved},
+      {"repair_moved_most", q->repair_moved_most},
+      {"repair_coefficient_shift", q->repair_shift},
+      {"coefficient_error", q->coefficient_error},
+      {"fixed_shift", q->fixed_shift},
+      {"iterations", q->iterations},
+  };
+  for (size_t i = 0; object && i < sizeof numbers / sizeof *numbers; i++)
+    json_object_set_new(object, numbers[i].key, ep_json_number(numbers[i].value));
+  return object;
+}
+
+void ep_pose_text(FILE *out, const char *name, const ep_pose_quality *q) {
+  fprintf(out, "pose %s: %.0f inverted tets (%.0f before repair), smallest volume %.3f of rest\n",
+          name, q->inverted_tets, q->inverted_before, q->worst_volume_ratio);
+  if (q->crushed_before > 0)
+    fprintf(out,
+            "  repair moved vertices by %.1e of the diagonal (rms, %.1e at most), the low "
+            "coefficients by %.1e\n",
+            q->repair_moved, q->repair_moved_most, q->repair_shift);
+}

@@ -59,4 +59,33 @@ ep_status ep_lb_pose(const ep_mesh *mesh, const ep_lb *lb, const double *d,
                      const ep_pose_options *options, double *u, ep_pose_report *report,
                      ep_error *err);
 
+// Give volume back to the tets a pose has inverted or crushed, moving the rest as little as
+// possible (pose_repair.c): least change of the deformation gradients,
+//   min sum_e V_e |F_e(u) - F_e(u0)|^2  with  det F_e(u) >= target  for every tet,
+// the first m coefficients Phi^T M u kept: exactly where nothing is held, else up to the softness
+// of ep_lb_pose. Held vertices do not move. A pose without such tets is left as it is, bit by bit.
+typedef struct ep_repair_options {
+  int m;                     // coefficients kept, <= lb->m; 0: none, lb may then be NULL
+  const unsigned char *held; // (n) vertices that do not move, or NULL
+  double floor;              // smallest deformed / rest volume that is no crushed tet: 0.05
+  double target;             // what crushed tets are given: 0.12
+  int iterations;            // Gauss-Newton steps at most
+} ep_repair_options;
+ep_repair_options ep_default_repair_options(void);
+
+typedef struct ep_repair_report {
+  int inverted_before, inverted_after; // volume <= 0
+  int crushed_before, crushed_after;   // volume < floor, inverted ones counted too
+  double worst_before, worst_after;    // smallest deformed / rest volume
+  double moved, moved_most; // rms (by volume) and largest move of a vertex over the diagonal
+  double coefficient_shift; // |Phi^T M (u - u0)| / |Phi^T M u0| over the first m; 0 where m is 0
+  int iterations;
+} ep_repair_report;
+
+// u (n x 3): in the pose, out the repaired one. What could not be repaired is in the report, and is
+// no error here. Errors: EP_ERR_ARGUMENT for options out of range or a u that is not finite,
+// EP_ERR_UNSUPPORTED as in ep_lb_pose, EP_ERR_NUMERIC.
+ep_status ep_lb_repair(const ep_mesh *mesh, const ep_lb *lb, const ep_repair_options *options,
+                       double *u, ep_repair_report *report, ep_error *err);
+
 #endif

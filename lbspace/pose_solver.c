@@ -32,7 +32,7 @@ static ep_status allocate(ep_pose_solver *s, ep_error *err) {
   s->volume = malloc(nt * sizeof *s->volume);
   s->vertex_volume = malloc(n * sizeof *s->vertex_volume);
   s->component = malloc(n * sizeof *s->component);
-  s->mphi = malloc(m * n * sizeof *s->mphi);
+  s->mphi = malloc((m + 1) * n * sizeof *s->mphi);
   s->rhs = malloc(3 * n * sizeof *s->rhs);
   s->next = malloc(3 * n * sizeof *s->next);
   const int all =
@@ -86,6 +86,7 @@ static ep_status weigh_functions(ep_pose_solver *s, ep_error *err) {
 // Rows K_ff^-1 A_j^T, and the inverse of A W + softness.
 static ep_status prepare_responses(ep_pose_solver *s, const double *lambda, ep_error *err) {
   const size_t n = (size_t)s->mesh->nv, m = (size_t)s->m;
+  if (m == 0) return EP_OK;
   s->response = malloc(m * n * sizeof *s->response);
   s->compliance = calloc(m * m, sizeof *s->compliance);
   double *gram = malloc(m * m * sizeof *gram);
@@ -106,7 +107,8 @@ static ep_status prepare_responses(ep_pose_solver *s, const double *lambda, ep_e
 
 ep_status ep_pose_solver_make(const ep_mesh *mesh, const ep_lb *lb, int m,
                               const unsigned char *held, ep_pose_solver *s, ep_error *err) {
-  *s = (ep_pose_solver){.mesh = mesh, .m = m, .held = held != NULL, .phi = lb->phi};
+  *s = (ep_pose_solver){
+      .mesh = mesh, .m = m, .held = held != NULL, .phi = lb->phi, .lambda = lb->lambda};
   EP_TRY(allocate(s, err));
   for (int e = 0; e < mesh->nt; e++)
     s->volume[e] = ep_tet_gradients(mesh, e, s->gradient + 12 * (size_t)e);
@@ -132,6 +134,7 @@ void ep_pose_solver_free(ep_pose_solver *s) {
 }
 
 void ep_pose_coefficients(const ep_pose_solver *s, const double *u, double *d) {
+  if (s->m == 0) return;
   ep_gemm(s->m, 3, s->mesh->nv, s->mphi, u, d);
 }
 
@@ -147,8 +150,9 @@ static void add_rows(const ep_pose_solver *s, const double *rows, const double *
 
 void ep_pose_set_coefficients(ep_pose_solver *s, const double *d, double *u) {
   double *miss = s->rhs, *mu = miss + 3 * s->m; // rhs is free here; m < n / 2 is checked by callers
+  if (s->m == 0) return;
   ep_pose_coefficients(s, u, miss);
-  for (int i = 0; i < 3 * s->m; i++) miss[i] = d[i] - miss[i];
+  for (int i = 0; i < 3 * s->m; i++) miss[i] = (d ? d[i] : 0) - miss[i];
   if (!s->held) {
     add_rows(s, s->phi, miss, u);
     return;
@@ -217,4 +221,19 @@ ep_status ep_pose_iterate(ep_pose_solver *s, const double *d, double *u, double 
     return ep_fail(err, EP_ERR_NUMERIC, "pose of %s: positions are no longer finite",
                    s->mesh->name);
   return EP_OK;
+}
+
+ep_status ep_pose_solve(ep_pose_solver *s, const double *b, double *x, ep_error *err) {
+  EP_TRY(ep_factor_solve(s->factor, 3, b, x, err));
+  if (!s->held) EP_TRY(remove_means(s, x, err));
+  ep_pose_set_coefficients(s, NULL, x);
+  return EP_OK;
+}
+
+double ep_pose_spring_energy(const ep_pose_solver *s, const double *u, double *d) {
+  double sum = 0;
+  if (!s->held) return 0;
+  ep_pose_coefficients(s, u, d);
+  for (int i = 0; i < 3 * s->m; i++) sum += s->lambda[i / 3] / softness * d[i] * d[i];
+  return sum;
 }
