@@ -13,6 +13,7 @@
   X(v, r)                                                                                         \
   X(w, k + 1)              /* weights of rest and examples, target of the last interpolation */   \
   X(target, r)                                                                                    \
+  X(shift, 3 * m)          /* what nonlinear interpolation adds to the blend: target.c */          \
   X(k0_factor, r * r)      /* lower Cholesky factor of K0 */                                      \
   X(target_inverse, examples * s * 9)  /* the target as undeformed shape: F_t^-1, w |det F_t| */   \
   X(target_weight, examples * s)                                                                  \

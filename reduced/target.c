@@ -113,8 +113,34 @@ static void choose_start(ep_state *state, double *q) {
   if (last < blend) memcpy(q, state->target, (size_t)r * sizeof *q);
 }
 
+// The target should be the shape of the example manifold *nearest* to c (Zhao et al. 2018 eq. 1),
+// but eq. 5 measures the distance to sum w_i e_i, and the nonlinear target t(w) of eq. 4 lies
+// elsewhere: at w = .1 anywhere from .04 to .2 of the way. A strong example force would amplify
+// that step by step: a shape right on the manifold would creep along it. So the weights are
+// measured against c less the shift c(t) - sum w_i e_i of the target before; half of its change is
+// taken each time, which converges as long as t moves less than four times as fast as the blend. At
+// rest then c(t(w)) is nearest to c, and a shape on the manifold is its own target.
+static const double shift_relaxation = 0.5;
+
+static void subtract_shift(const ep_state *state, double *c) {
+  for (int i = 0; i < 3 * state->model->size.m; i++) c[i] -= state->shift[i];
+}
+
+static void update_shift(ep_state *state) {
+  const ep_model *m = state->model;
+  const int length = 3 * m->size.m;
+  ep_descriptor(m, state->target, state->c);
+  for (int i = 0; i < length; i++) {
+    double blend = state->w[0] * m->c0[i];
+    for (int e = 0; e < m->size.k; e++)
+      blend += state->w[e + 1] * m->example_c[(size_t)e * (size_t)length + (size_t)i];
+    state->shift[i] += shift_relaxation * (state->c[i] - blend - state->shift[i]);
+  }
+}
+
 ep_status ep_find_target(ep_state *state, const ep_step_def *def, ep_target_report *report) {
   ep_descriptor(state->model, state->q, state->c);
+  subtract_shift(state, state->c);
   ep_status status = ep_example_weights(state, state->c, state->next_w);
   if (status != EP_OK) return status;
   if (!single_shape(state, state->next_target)) {
@@ -132,4 +158,5 @@ void ep_commit_target(ep_state *state) {
   memcpy(state->w, state->next_w, (size_t)(state->model->size.k + 1) * sizeof *state->w);
   memcpy(state->target, state->next_target, (size_t)state->model->size.r * sizeof *state->target);
   state->has_target = 1;
+  update_shift(state);
 }

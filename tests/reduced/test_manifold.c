@@ -1,0 +1,76 @@
+// The target is the shape of the example manifold nearest to the object (Zhao et al. 2018, eq. 1):
+// a shape t(w) on the manifold is its own target, with its own weights, once the shift between the
+// nonlinear interpolation (eq. 4) and the blend that eq. 5 measures is known.
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "tests/reduced/bar.h"
+
+enum { R = 12, EXAMPLES = 2 };
+
+static double distance(const double *a, const double *b, int n) {
+  double sum = 0;
+  for (int i = 0; i < n; i++) sum += (a[i] - b[i]) * (a[i] - b[i]);
+  return sqrt(sum);
+}
+
+static void shape_on_manifold_is_its_own_target(void **unused) {
+  (void)unused;
+  bar *b = bar_create(6, 2, 2, R, 0, 4, EXAMPLES, EP_STVK_VOLUME);
+  void *block;
+  ep_state *state = bar_state(b, &block);
+  const double wanted[EXAMPLES + 1] = {0.5, 0.3, 0.2};
+  double shape[R] = {0}, origin[R] = {0};
+  ep_target_report report;
+  assert_int_equal(ep_target_newton(NULL, state, wanted, shape, 1e-10, &report), EP_OK);
+  memcpy(ep_state_q(state), shape, sizeof shape);
+
+  ep_step_def def = ep_default_step();
+  def.target_tolerance = 1e-10;
+  assert_int_equal(ep_interpolate(state, &def, NULL), EP_OK);
+  const double first = distance(ep_state_weights(state), wanted + 1, EXAMPLES);
+  assert_true(first > 0.005); // eq. 5 alone misses: else this test says nothing
+  // Halving the error of the shift a round: 60 rounds leave round-off and the tolerance above.
+  for (int i = 0; i < 60; i++) assert_int_equal(ep_interpolate(state, &def, NULL), EP_OK);
+  assert_true(distance(ep_state_weights(state), wanted + 1, EXAMPLES) < 1e-6);
+  assert_true(distance(ep_state_target(state), shape, R) < 1e-6 * distance(shape, origin, R));
+  free(block);
+  bar_free(b);
+}
+
+// The rest shape and the examples are on the manifold as they are: no shift, at once.
+static void corners_need_no_shift(void **unused) {
+  (void)unused;
+  bar *b = bar_create(6, 2, 2, R, 0, 4, EXAMPLES, EP_STVK_VOLUME);
+  void *block;
+  ep_state *state = bar_state(b, &block);
+  ep_step_def def = ep_default_step();
+  for (int i = 0; i <= EXAMPLES; i++) {
+    double corner[R] = {0};
+    if (i > 0) memcpy(corner, b->model.example_q + (i - 1) * R, sizeof corner);
+    memcpy(ep_state_q(state), corner, sizeof corner);
+    for (int round = 0; round < 3; round++) {
+      assert_int_equal(ep_interpolate(state, &def, NULL), EP_OK);
+      for (int e = 0; e < EXAMPLES; e++)
+        assert_true(fabs(ep_state_weights(state)[e] - (e + 1 == i)) < 1e-7);
+      assert_true(distance(ep_state_target(state), corner, R) < 1e-7);
+    }
+  }
+  free(block);
+  bar_free(b);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(shape_on_manifold_is_its_own_target),
+      cmocka_unit_test(corners_need_no_shift),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
