@@ -47,6 +47,10 @@ ep_status ep_model_open(const void *bytes, size_t size, ep_model *model, char *m
 // F; out (s x blocks x 72), blocks = ceil(r / 8), i.e. ep_packed_cubature_size(r, s) doubles.
 size_t ep_packed_cubature_size(int r, int s);
 void ep_pack_cubature(int r, int s, const double *g, double *out);
+// The layout of green_b, one matrix: b (r x r) symmetric, row-major; out ep_packed_green_size(r)
+// doubles: the lower triangle in 8 x 8 tiles, half the diagonal (reduced/green.h).
+size_t ep_packed_green_size(int r);
+void ep_pack_green(int r, const double *b, double *out);
 
 // ---- state -----------------------------------------------------------------------------------
 typedef struct ep_state ep_state;
@@ -101,6 +105,23 @@ double ep_target_residual(ep_state *state, const double *w, const double *g);
 ep_status ep_target_newton(void *user, ep_state *state, const double *w, double *q,
                            double tolerance, ep_target_report *report);
 
+// ---- Green-strain example potential ----------------------------------------------------------
+// The potential W_a of Zhang et al. 2015 (eq. 8 to 10), W_StVK + alpha W_a >= 0 for alpha <= 1, with
+// the weights of the examples explicit in q (reduced/green.c). A model has it where size.greens > 0.
+typedef struct ep_green {
+  double alpha;        // share of the examples, 0 (none) to 1 (no resistance along the examples)
+  double sum_to_one;   // weak constraints on the weights: quadratic penalties in units of the
+  double non_negative; // examples' mean strain energy; 0: none
+} ep_green;
+int ep_green_valid(const ep_green *green); // alpha in [0, 1], penalties finite and >= 0
+
+// W_a at q, gradient f (r) and Hessian h (r x r, both triangles) unless NULL; alpha is not applied.
+// 0 where the model has no such coefficients; NaN where q is not finite.
+double ep_green_energy(ep_state *state, const ep_green *green, const double *q, double *f,
+                       double *h);
+// (k) weights of the examples at the last evaluation; the rest shape has what is missing to 1.
+const double *ep_state_green_weights(const ep_state *state);
+
 // ---- step ------------------------------------------------------------------------------------
 typedef enum ep_example_force { EP_EXAMPLE_ENERGY, EP_EXAMPLE_LINEAR } ep_example_force;
 
@@ -112,6 +133,8 @@ typedef struct ep_step_def {
   double damping_mass;            // Rayleigh alpha [1/s]
   double damping_stiffness;       // Rayleigh beta [s], against K0
   double strength;                // example strength; 1: as stiff as the material itself; 0: none
+  ep_green green; // Green-strain potential (alpha 0: none). StVK: W + alpha W_a; another material:
+                  // (1 - alpha) W + alpha (W_StVK with volume penalty + W_a)
   ep_example_force example_force; // energy (target as undeformed shape) or strength K0 (q_t - q)
   ep_target_solver target_solver; // NULL: ep_target_newton
   void *target_user;
@@ -128,6 +151,7 @@ typedef struct ep_step_report {
   double residual;                                       // relative, at the end
   ep_target_report target;
   double elastic_energy, example_energy, kinetic_energy;
+  double green_energy; // of the Green-strain potential: alpha W_a (negative), or its mixed form
 } ep_step_report;
 
 // One implicit step: weights and target from the state's q, then the minimum of the incremental

@@ -79,8 +79,10 @@ static ep_status read_sizes(const ep_tensorfile *file, ep_model_sizes *z, char *
   if (z->r < 1 || z->r > MAX_MODES || z->s < 1 || z->n < 1 || z->nt < 1)
     return ep_text_refuse(message, "impossible sizes: r, s, n and nt must be at least 1");
   if (z->blocks != (z->r + 7) / 8) return ep_text_refuse(message, "blocks is not ceil(r / 8)");
-  if (z->k > MAX_EXAMPLES || z->m > z->n || (z->k > 0 && z->m < 1))
-    return ep_text_refuse(message, "impossible sizes: k examples need descriptors, 1 <= m <= n");
+  if (z->k > MAX_EXAMPLES || z->m > z->n || (z->k > 0 && z->m < 1 && z->greens < 1))
+    return ep_text_refuse(message, "impossible sizes: k examples need descriptors, 1 <= m <= n, or "
+                                   "the coefficients of their strains");
+  if (z->greens > z->k) return ep_text_refuse(message, "greens is more than the examples, k");
   return EP_OK;
 }
 
@@ -144,6 +146,7 @@ static ep_status check_index(const char *name, const int32_t *x, int64_t count, 
 static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *message) {
   const int n = model->size.n, nt = model->size.nt, r = model->size.r, m = model->size.m;
   const int k = model->size.k, s = model->size.s, blocks = model->size.blocks;
+  const int greens = model->size.greens;
   const void *data;
 #define DTYPE_double EP_F64
 #define DTYPE_int32  EP_I32
@@ -159,7 +162,8 @@ static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *m
   FIRST_FAILURE(check_at_least_zero("cubature_w", model->cubature_w, s, message));
   FIRST_FAILURE(check_at_least_zero("cubature_lambda", model->cubature_lambda, s, message));
   FIRST_FAILURE(check_at_least_zero("cubature_mu", model->cubature_mu, s, message));
-  return check_at_least_zero("example_w", model->example_w, k * s, message);
+  FIRST_FAILURE(check_at_least_zero("green_scale", model->green_scale, greens ? 1 : 0, message));
+  return check_at_least_zero("example_w", model->example_w, m ? k * s : 0, message);
 }
 
 static ep_status read_scale(const ep_tensorfile *file, double *scale, char *message) {

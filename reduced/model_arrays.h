@@ -3,12 +3,13 @@
 // Dimensions are members of ep_model_sizes (or literals). Arrays whose product is 0 are absent.
 //
 //   sizes: n vertices, nt tets, r modes, m LB functions of the descriptor (the constant one
-//   included for constrained objects), k examples, s cubature elements, blocks = ceil(r / 8):
-//   groups of 8 modes.
+//   included for constrained objects; 0 where no descriptors are used), k examples, s cubature
+//   elements, blocks = ceil(r / 8): groups of 8 modes, greens independent strains of the examples
+//   (Green-strain path; 0: not used).
 #ifndef EP_REDUCED_MODEL_ARRAYS_H
 #define EP_REDUCED_MODEL_ARRAYS_H
 
-#define EP_MODEL_SIZES(X) X(n) X(nt) X(r) X(m) X(k) X(s) X(blocks)
+#define EP_MODEL_SIZES(X) X(n) X(nt) X(r) X(m) X(k) X(s) X(blocks) X(greens)
 
 // clang-format off
 #define EP_MODEL_ARRAYS(X)                                                                        \
@@ -33,8 +34,16 @@
   /* modes beyond r zero. Filled by ep_pack_cubature alone: no one else knows this layout */       \
   X(double, cubature_g,    s, blocks, 72)                                                         \
   /* per example, per cubature element: inverse of F_i (row-major 9) and w |det F_i| */           \
-  X(double, example_finv,  k, s, 9)                                                               \
-  X(double, example_w,     k, s, 1)
+  X(double, example_finv,  m ? k : 0, s, 9)                                                       \
+  X(double, example_w,     m ? k : 0, s, 1)                                                       \
+  /* Green-strain path: y_i = linear_i . q + 1/2 q^T B_i q of orthonormal combinations of the */  \
+  /* examples' strains, B_i in 8 x 8 tiles (reduced/green.h); weights w = V y, V (k x greens); */ \
+  /* strain energy of each example; their mean, the unit of the weights' penalties */             \
+  X(double, green_b,       greens, blocks * (blocks + 1) / 2, 64)                                 \
+  X(double, green_linear,  greens, blocks, 8)                                                     \
+  X(double, green_weights, k, greens, 1)                                                          \
+  X(double, green_energy,  greens ? k : 0, 1, 1)                                                  \
+  X(double, green_scale,   greens ? 1 : 0, 1, 1)
 // clang-format on
 
 #endif

@@ -14,3 +14,18 @@ void ep_pack_cubature(int r, int s, const double *g, double *out) {
       for (size_t a = 0; a < modes; a++)
         out[((e * blocks + a / 8) * 9 + entry) * 8 + a % 8] = g[(9 * e + entry) * modes + a];
 }
+
+size_t ep_packed_green_size(int r) {
+  const size_t blocks = (size_t)(r + 7) / 8;
+  return blocks * (blocks + 1) / 2 * 64;
+}
+
+void ep_pack_green(int r, const double *b, double *out) {
+  const size_t modes = (size_t)r;
+  memset(out, 0, ep_packed_green_size(r) * sizeof *out);
+  for (size_t p = 0; p < modes; p++)
+    for (size_t q = 0; q <= p; q++) {
+      const size_t tile = p / 8 * (p / 8 + 1) / 2 + q / 8;
+      out[64 * tile + 8 * (p % 8) + q % 8] = (p == q ? 0.5 : 1) * b[p * modes + q];
+    }
+}

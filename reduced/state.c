@@ -13,7 +13,8 @@ static size_t rounded(size_t bytes) {
 static size_t lay_out(const ep_model *model, char *memory, ep_state *state) {
   const size_t r = (size_t)model->size.r, m = (size_t)model->size.m, k = (size_t)model->size.k;
   const size_t s = (size_t)model->size.s, width = 8 * (size_t)model->size.blocks;
-  const size_t examples = k > 0; // without examples their scratch is left out
+  const size_t greens = (size_t)model->size.greens;
+  const size_t examples = k > 0 && m > 0; // without descriptors their scratch is left out
   size_t used = rounded(sizeof *state);
   if (memory) state->term = (ep_kernel_term *)(memory + used);
   used += rounded((k + 2) * sizeof *state->term);
@@ -53,6 +54,7 @@ ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_st
   lay_out(model, memory, state);
   state->model = model;
   state->kernel = ep_kernel_select(&state->isa);
+  state->green_kernel = ep_green_select();
   state->w[0] = 1;
   measure_scales(state);
   if (!ep_cholesky(model->size.r, model->k0, state->k0_factor)) return EP_ERR_NUMERIC;

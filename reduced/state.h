@@ -4,6 +4,7 @@
 #define EP_REDUCED_STATE_H
 
 #include "reduced/eigenpose.h"
+#include "reduced/green.h"
 #include "reduced/kernel.h"
 
 // Arrays of a state: X(name, number of doubles). width = 8 ceil(r / 8).
@@ -41,12 +42,24 @@
   X(end_v, r)                                                                                     \
   X(next_w, k + 1)         /* interpolation under way: kept only when the step succeeds */        \
   X(next_target, r)                                                                               \
-  X(work, r)
+  X(work, r)                                                                                      \
+  X(green_y0, greens)      /* Green-strain path (reduced/green.c) */                              \
+  X(green_y, greens)                                                                              \
+  X(green_last, greens)                                                                           \
+  X(green_a, greens)                                                                              \
+  X(green_c, greens * greens)                                                                     \
+  X(green_w, k)                                                                                   \
+  X(green_trial_w, k)                                                                             \
+  X(green_jacobian, greens * width)                                                               \
+  X(green_low, greens * width)                                                                    \
+  X(green_f, greens ? r : 0)   /* W_StVK beside another material */                              \
+  X(green_h, greens ? r * r : 0)
 // clang-format on
 
 struct ep_state {
   const ep_model *model;
   ep_kernel kernel;
+  ep_green_kernel green_kernel;
   const char *isa;
   ep_kernel_term *term; // (k + 2) terms of one evaluation
   double energy_scale;  // sum_j w_j (lambda + 2 mu): energy at unit strain
@@ -62,6 +75,19 @@ struct ep_state {
 // Evaluate the first `terms` of state->term at q: sum of the energies (each in its term), f (r) and
 // k (r x r) unless NULL.
 double ep_evaluate(ep_state *state, int terms, const double *q, double *f, double *k, int project);
+// The same with another law than the model's.
+double ep_evaluate_law(ep_state *state, ep_material material, int terms, const double *q, double *f,
+                       double *k, int project);
+
+// What the examples' strains add to (1 - alpha or 1) W (eigenpose.h): alpha W_a, for a law other
+// than StVK alpha (W_StVK + W_a), W_StVK with the volume penalty; added to f and h unless NULL.
+double ep_green_potential(ep_state *state, const ep_green *green, const double *q, double *f,
+                          double *h, int project);
+// Factor of the material's own energy beside it.
+double ep_green_share(const ep_model *model, const ep_green *green);
+// strength W_a at q; its gradient and Hessian are added to f and h unless NULL (reduced/green.c).
+double ep_green_add(ep_state *state, const ep_green *green, double strength, const double *q,
+                    double *f, double *h);
 
 // Weights and target of the state's q into next_w and next_target, and the target as undeformed
 // shape of an energy into target_inverse and target_weight (without elements it crushes).

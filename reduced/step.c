@@ -23,16 +23,18 @@ int ep_step_def_valid(const ep_step_def *d) {
   return d->cookie == COOKIE && d->dt > 0 && isfinite(d->dt) && d->damping_mass >= 0 &&
          isfinite(d->damping_mass) && d->damping_stiffness >= 0 && isfinite(d->damping_stiffness) &&
          d->strength >= 0 && isfinite(d->strength) && d->tolerance > 0 && d->target_tolerance > 0 &&
-         d->max_iterations > 0 && ep_integrator_name(d->integrator) != NULL &&
+         d->max_iterations > 0 && ep_green_valid(&d->green) &&
+         ep_integrator_name(d->integrator) != NULL &&
          (d->example_force == EP_EXAMPLE_ENERGY || d->example_force == EP_EXAMPLE_LINEAR);
 }
 
 typedef struct step {
   ep_state *state;
   const ep_step_def *def;
-  int examples;            // an example force acts
-  double rate, inertia;    // of the integrator
-  double internal, linear; // last evaluation: |force| inside, energy of the linear example force
+  int examples;         // an example force acts
+  double rate, inertia; // of the integrator
+  double internal;      // last evaluation: |force| inside, energies
+  double elastic, pull, strains;
 } step;
 
 // y = scale * K0 (x - origin) added to g; returns (x - origin)^T K0 (x - origin). origin NULL: 0.
@@ -55,15 +57,18 @@ static double inner_energy(step *s, const double *x, double *g, double *h, int p
   ep_state *state = s->state;
   const ep_step_def *def = s->def;
   const int as_energy = s->examples && def->example_force == EP_EXAMPLE_ENERGY;
-  state->term[0] = (ep_kernel_term){.scale = 1, .weight = state->model->cubature_w};
+  state->term[0] = (ep_kernel_term){.scale = ep_green_share(state->model, &def->green),
+                                    .weight = state->model->cubature_w};
   if (as_energy)
     state->term[1] = (ep_kernel_term){
         .scale = def->strength, .inverse = state->target_inverse, .weight = state->target_weight};
-  double energy = ep_evaluate(state, 1 + as_energy, x, g, h, project);
-  s->linear = 0;
+  ep_evaluate(state, 1 + as_energy, x, g, h, project);
+  s->elastic = state->term[0].energy;
+  s->pull = as_energy ? state->term[1].energy : 0;
   if (s->examples && !as_energy)
-    s->linear = 0.5 * def->strength * add_k0(s, def->strength, x, state->next_target, g);
-  return energy + s->linear;
+    s->pull = 0.5 * def->strength * add_k0(s, def->strength, x, state->next_target, g);
+  s->strains = ep_green_potential(state, &def->green, x, g, h, project);
+  return s->elastic + s->pull + s->strains;
 }
 
 static double energy(void *user, const double *x, double *g, double *h, int project) {
@@ -158,6 +163,7 @@ ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *repor
   *report = (ep_step_report){0};
   if (!ep_step_def_valid(def)) return EP_ERR_ARGUMENT;
   step s = {.state = state, .def = def, .examples = state->model->size.k > 0 && def->strength > 0};
+  s.examples = s.examples && state->model->size.m > 0; // else only their strains are known
   if (s.examples) {
     ep_status status = ep_find_target(state, def, &report->target);
     if (status != EP_OK) return status;
@@ -176,10 +182,9 @@ ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *repor
   report->residual = newton.residual_now;
   if (status != EP_OK) return status;
   finish(&s);
-  report->elastic_energy = state->term[0].energy;
-  if (s.examples)
-    report->example_energy =
-        def->example_force == EP_EXAMPLE_ENERGY ? state->term[1].energy : s.linear;
+  report->elastic_energy = s.elastic;
+  report->example_energy = s.pull;
+  report->green_energy = s.strains;
   report->kinetic_energy = 0.5 * ep_dot(state->model->size.r, state->v, state->v);
   return EP_OK;
 }
@@ -190,7 +195,7 @@ double ep_example_force_energy(ep_state *state, const ep_step_def *def, const do
   const step s = {.state = state, .def = def};
   if (f) memset(f, 0, (size_t)r * sizeof *f);
   if (h) memset(h, 0, (size_t)(r * r) * sizeof *h);
-  if (state->model->size.k == 0 || def->strength == 0) return 0;
+  if (state->model->size.k == 0 || state->model->size.m == 0 || def->strength == 0) return 0;
   if (def->example_force == EP_EXAMPLE_ENERGY) {
     state->term[0] = (ep_kernel_term){
         .scale = def->strength, .inverse = state->target_inverse, .weight = state->target_weight};
@@ -205,7 +210,7 @@ ep_status ep_interpolate(ep_state *state, const ep_step_def *def, ep_target_repo
   if (!report) report = &unused;
   *report = (ep_target_report){0};
   if (!ep_step_def_valid(def)) return EP_ERR_ARGUMENT;
-  if (state->model->size.k == 0) return EP_OK;
+  if (state->model->size.k == 0 || state->model->size.m == 0) return EP_OK;
   ep_status status = ep_find_target(state, def, report);
   if (status == EP_OK) ep_commit_target(state);
   return status;

@@ -30,7 +30,9 @@ static ep_status check_parts(const ep_model_parts *p, ep_error *err) {
     return ep_fail(err, EP_ERR_ARGUMENT,
                    "%d eigenfunctions wanted, the Laplace-Beltrami space has %d on %d vertices",
                    p->m, p->lb->m, p->lb->n);
-  if (p->basis->examples > 0 && p->m == 0)
+  if (p->green && (p->green->r != p->basis->r || p->green->k != p->basis->examples))
+    return ep_fail(err, EP_ERR_ARGUMENT, "the Green-strain coefficients are of another basis");
+  if (p->basis->examples > 0 && p->m == 0 && !p->green)
     return ep_fail(err, EP_ERR_ARGUMENT, "%d examples, but no eigenfunctions to describe them",
                    p->basis->examples);
   for (int j = 0; j < p->s; j++) {
@@ -48,7 +50,8 @@ static ep_status check_parts(const ep_model_parts *p, ep_error *err) {
 static ep_status allocate(builder *b, ep_model_memory *out, ep_error *err) {
   const ep_model_sizes *z = &b->size;
   int n = z->n, nt = z->nt, r = z->r, m = z->m, k = z->k, s = z->s, blocks = z->blocks;
-  (void)n, (void)nt, (void)r, (void)m, (void)k, (void)s, (void)blocks;
+  int greens = z->greens;
+  (void)n, (void)nt, (void)r, (void)m, (void)k, (void)s, (void)blocks, (void)greens;
 #define X(type, name, d1, d2, d3)                                                                  \
   if ((size_t)(d1) * (size_t)(d2) * (size_t)(d3) > 0) {                                            \
     size_t bytes = (size_t)(d1) * (size_t)(d2) * (size_t)(d3) * sizeof *b->a.name;                 \
@@ -152,7 +155,7 @@ static void fill_cubature(builder *b, double *g) {
     b->a.cubature_w[j] = p->weight[j];
     b->a.cubature_lambda[j] = p->fem->lambda[p->tet[j]];
     b->a.cubature_mu[j] = p->fem->mu[p->tet[j]];
-    for (int i = 0; i < b->size.k; i++) example_at_element(b, i, j, gj);
+    for (int i = 0; b->size.m > 0 && i < b->size.k; i++) example_at_element(b, i, j, gj);
   }
   ep_pack_cubature(b->size.r, b->size.s, g, b->a.cubature_g);
 }
@@ -165,6 +168,22 @@ static ep_status build_cubature(builder *b, ep_error *err) {
   return EP_OK;
 }
 
+static void fill_green(builder *b) {
+  const ep_green_coefficients *green = b->parts->green;
+  const int r = b->size.r, k = b->size.k, count = b->size.greens;
+  const size_t width = 8 * (size_t)b->size.blocks;
+  for (int i = 0; i < count; i++) {
+    ep_pack_green(r, green->b + (size_t)i * (size_t)(r * r),
+                  b->a.green_b + (size_t)i * ep_packed_green_size(r));
+    memcpy(b->a.green_linear + (size_t)i * width, green->linear + (size_t)i * (size_t)r,
+           (size_t)r * sizeof(double));
+  }
+  if (count == 0) return;
+  memcpy(b->a.green_weights, green->weights, (size_t)(k * count) * sizeof(double));
+  memcpy(b->a.green_energy, green->energy, (size_t)k * sizeof(double));
+  for (int i = 0; i < k; i++) b->a.green_scale[0] += green->energy[i] / k;
+}
+
 static ep_model_sizes sizes_of(const ep_model_parts *p) {
   const int constants = p->m > 0 && p->fem->nheld > 0 ? 1 : 0;
   return (ep_model_sizes){.n = p->fem->mesh->nv,
@@ -173,7 +192,8 @@ static ep_model_sizes sizes_of(const ep_model_parts *p) {
                           .m = p->m + constants,
                           .k = p->basis->examples,
                           .s = p->s,
-                          .blocks = (p->basis->r + 7) / 8};
+                          .blocks = (p->basis->r + 7) / 8,
+                          .greens = p->green ? p->green->count : 0};
 }
 
 ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_error *err) {
@@ -185,6 +205,7 @@ ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_e
   copy_mesh_and_modes(&b);
   if (b.size.m > 0) EP_TRY_GOTO(status, build_descriptors(&b, err), fail);
   EP_TRY_GOTO(status, build_cubature(&b, err), fail);
+  fill_green(&b);
   out->model.size = b.size;
   out->model.material = parts->fem->model;
   out->model.rest_scale = ep_mesh_diagonal(parts->fem->mesh);

@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "lbspace/lbspace.h"
 #include "reduced/bake/basis.h"
+#include "reduced/bake/green_coefficients.h"
 #include "reduced/eigenpose.h"
 
 typedef struct ep_model_parts {
@@ -16,6 +17,7 @@ typedef struct ep_model_parts {
   int s;                 // cubature elements
   const int *tet;        // (s) element numbers
   const double *weight;  // (s) absolute volumes, >= 0
+  const ep_green_coefficients *green; // of the Green-strain path, NULL: not used
 } ep_model_parts;
 
 // A model with memory of its own; nothing of the parts is kept.

@@ -6,7 +6,7 @@
 
 static void *own(bar *b, size_t bytes) {
   void *block = aligned_alloc(64, (bytes + 63) / 64 * 64);
-  if (!block || b->owned_count == 32) abort();
+  if (!block || b->owned_count == 64) abort();
   memset(block, 0, (bytes + 63) / 64 * 64);
   return b->owned[b->owned_count++] = block;
 }
@@ -203,6 +203,87 @@ static void make_examples(bar *b) {
   b->model.example_finv = inverse, b->model.example_w = w;
 }
 
+// Stress lambda tr(E) I + 2 mu E of the Green strain at element e.
+static void strain_at(const bar *b, int e, const double *q, double strain[9], double stress[9]) {
+  const double lambda = b->model.cubature_lambda[e], mu = b->model.cubature_mu[e];
+  double f[9];
+  gradient_at(b, e, q, f);
+  for (int c = 0; c < 9; c++)
+    strain[c] = 0.5 * (f[c / 3] * f[c % 3] + f[3 + c / 3] * f[3 + c % 3] +
+                       f[6 + c / 3] * f[6 + c % 3] - (c % 4 == 0));
+  for (int c = 0; c < 9; c++)
+    stress[c] =
+        2 * mu * strain[c] + (c % 4 == 0 ? lambda * (strain[0] + strain[4] + strain[8]) : 0);
+}
+
+// Q = <E_i, E_j>, linear_i = <E_i, sym G>, B_i = <E_i, sym G^T G> by plain sums over elements.
+static void plain_green(const bar *b, double *gram, double *linear, double *matrix) {
+  const int r = b->model.size.r, k = b->model.size.k;
+  for (int e = 0; e < b->model.size.s; e++) {
+    const double *g = b->g + 9 * (size_t)b->model.cubature_tet[e] * (size_t)r;
+    const double half = 0.5 * b->model.cubature_w[e];
+    for (int i = 0; i < k; i++) {
+      double strain[9], stress[9], other[9], unused[9];
+      strain_at(b, e, b->model.example_q + i * r, strain, stress);
+      for (int j = 0; j < k; j++) {
+        strain_at(b, e, b->model.example_q + j * r, other, unused);
+        for (int c = 0; c < 9; c++) gram[i * k + j] += half * stress[c] * other[c];
+      }
+      for (int a = 0; a < r; a++) {
+        for (int c = 0; c < 9; c++) linear[i * r + a] += half * stress[c] * g[c * r + a];
+        for (int o = 0; o < r; o++)
+          for (int c = 0; c < 9; c++)
+            for (int d = 0; d < 3; d++) // (G_a^T G_o)_c = sum_d G_a,(d, row c) G_o,(d, column c)
+              matrix[(i * r + a) * r + o] +=
+                  half * stress[c] * g[(3 * d + c / 3) * r + a] * g[(3 * d + c % 3) * r + o];
+      }
+    }
+  }
+}
+
+// Orthonormal strains by a Cholesky factor Q = L L^T: V = L^-T.
+void bar_make_green(bar *b) {
+  const int r = b->model.size.r, k = b->model.size.k, width = 8 * b->model.size.blocks;
+  const size_t tiles = ep_packed_green_size(r);
+  if (k == 0) return;
+  double *gram = own(b, sizeof *gram * (size_t)(k * k) + 64),
+         *v = own(b, sizeof *v * (size_t)(k * k) + 64);
+  double *linear = own(b, sizeof *linear * (size_t)(k * r) + 64);
+  double *matrix = own(b, sizeof *matrix * (size_t)(k * r * r) + 64),
+         *sum = own(b, sizeof *sum * (size_t)(r * r) + 64);
+  double *packed = own(b, sizeof *packed * (size_t)k * tiles),
+         *padded = own(b, sizeof *padded * (size_t)(k * width));
+  double *energy = own(b, sizeof *energy * (size_t)k + 64), *scale = own(b, 64);
+  plain_green(b, gram, linear, matrix);
+  for (int i = 0; i < k; i++) { // Gram-Schmidt in the inner product Q, on coefficients
+    energy[i] = gram[i * k + i];
+    scale[0] += energy[i] / k;
+    double *c = sum; // column i of V
+    for (int j = 0; j < k; j++) c[j] = j == i;
+    for (int pass = 0; pass < 2; pass++)
+      for (int o = 0; o < i; o++) {
+        double along = 0;
+        for (int j = 0; j < k; j++)
+          for (int l = 0; l < k; l++) along += v[j * k + o] * gram[j * k + l] * c[l];
+        for (int j = 0; j < k; j++) c[j] -= along * v[j * k + o];
+      }
+    double square = 0;
+    for (int j = 0; j < k; j++)
+      for (int l = 0; l < k; l++) square += c[j] * gram[j * k + l] * c[l];
+    for (int j = 0; j < k; j++) v[j * k + i] = c[j] / sqrt(square);
+  }
+  for (int i = 0; i < k; i++) {
+    memset(sum, 0, (size_t)(r * r) * sizeof *sum);
+    for (int j = 0; j < k; j++) {
+      for (int a = 0; a < r * r; a++) sum[a] += v[j * k + i] * matrix[j * r * r + a];
+      for (int a = 0; a < r; a++) padded[i * width + a] += v[j * k + i] * linear[j * r + a];
+    }
+    ep_pack_green(r, sum, packed + (size_t)i * tiles);
+  }
+  b->model.green_b = packed, b->model.green_linear = padded, b->model.green_weights = v;
+  b->model.green_energy = energy, b->model.green_scale = scale;
+}
+
 // ---- public ------------------------------------------------------------------------------------
 
 bar *bar_create(int nx, int ny, int nz, int r, int s, int m, int k, ep_material material) {
@@ -213,7 +294,14 @@ bar *bar_create(int nx, int ny, int nz, int r, int s, int m, int k, ep_material 
   double *x;
   int32_t *tets;
   b->seed = 7;
-  b->model.size = (ep_model_sizes){n, nt, r, m, k, s ? s : nt, (r + 7) / 8};
+  b->model.size = (ep_model_sizes){.n = n,
+                                   .nt = nt,
+                                   .r = r,
+                                   .m = m,
+                                   .k = k,
+                                   .s = s ? s : nt,
+                                   .blocks = (r + 7) / 8,
+                                   .greens = k};
   b->model.material = material, b->model.rest_scale = sqrt(18);
   make_mesh(b, nx, ny, nz, &x, &tets);
   b->model.rest_x = x, b->model.tets = tets;
@@ -231,6 +319,7 @@ bar *bar_create(int nx, int ny, int nz, int r, int s, int m, int k, ep_material 
   make_cubature(b, s == 0, lambda, mu);
   make_descriptors(b, mass);
   make_examples(b);
+  bar_make_green(b);
   return b;
 }
 

@@ -13,7 +13,7 @@ typedef struct bar {
   ep_model model;
   double *g;       // (nt x 9 x r) dF/dq of all elements, unpacked
   double *volume;  // (nt)
-  void *owned[32]; // for bar_free
+  void *owned[64]; // for bar_free
   int owned_count;
   uint32_t seed;
 } bar;
@@ -29,6 +29,9 @@ void bar_random_q(bar *b, double amplitude, double *q); // max_j |G_j q|_F = amp
 
 // A state in memory of its own (free the block), for convenience.
 ep_state *bar_state(const bar *b, void **block);
+
+// The coefficients of the Green-strain path anew, after the examples or their number were changed.
+void bar_make_green(bar *b);
 
 // The plain sum over elements with the scalar laws: energy of the cubature with F_j B_j; f, k as in
 // ep_elastic_energy. inverse (s x 9) or NULL, weight (s).
