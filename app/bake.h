@@ -8,6 +8,7 @@
 #include "cubature/cubature.h"
 #include "lbspace/lbspace.h"
 #include "reduced/bake/basis.h"
+#include "reduced/bake/green_coefficients.h"
 
 // What an example's pose on the object's mesh is worth.
 typedef struct ep_pose_quality {
@@ -39,6 +40,7 @@ typedef struct ep_bake {
   double *paths; // (examples * samples x 3n)
   ep_basis basis;
   ep_cubature cubature;
+  ep_green_coefficients green;
 } ep_bake;
 
 // scene, shapes, plan, cache, log are borrowed.
@@ -58,6 +60,7 @@ ep_status ep_bake_modes(ep_bake *bake, ep_error *err);
 ep_status ep_bake_paths(ep_bake *bake, ep_error *err);
 ep_status ep_bake_basis(ep_bake *bake, ep_error *err);
 ep_status ep_bake_cubature(ep_bake *bake, ep_error *err);
+ep_status ep_bake_green(ep_bake *bake, ep_error *err);
 // The whole bake; path (EP_PATH_MAX) receives the model file in the cache. Stages that were not
 // even looked at, because a later result was there, count as cached.
 ep_status ep_bake_model(ep_bake *bake, char *path, ep_error *err);

@@ -214,9 +214,10 @@ ep_status ep_bake_cubature(ep_bake *bake, ep_error *err) {
 // ---- model -----------------------------------------------------------------------------------
 
 static ep_status write_model(ep_bake *bake, const char *path, ep_error *err) {
-  const bool examples = bake->shapes->examples > 0;
+  const bool examples = bake->shapes->examples > 0 && (bake->scene->methods & EP_METHOD_LB);
   EP_TRY(ep_bake_fem(bake, err));
   EP_TRY(ep_bake_basis(bake, err));
+  EP_TRY(ep_bake_green(bake, err));
   if (examples) EP_TRY(ep_bake_lb(bake, 0, err));
   const ep_model_parts parts = {
       .fem = &bake->fem,
@@ -227,6 +228,7 @@ static ep_status write_model(ep_bake *bake, const char *path, ep_error *err) {
       .s = bake->cubature.count,
       .tet = bake->cubature.tet,
       .weight = bake->cubature.weight,
+      .green = bake->green.b ? &bake->green : NULL,
   };
   ep_model_memory memory;
   EP_TRY(ep_model_build(&parts, &memory, err));

@@ -146,6 +146,7 @@ static ep_status write_csv(const char *folder, const ep_model *model, const ep_r
                            ep_error *err) {
   char path[EP_PATH_MAX];
   EP_TRY(ep_path_join(folder, "trajectory.csv", path, err));
+  const bool green = record->green_weights != NULL;
   const ep_csv_group groups[] = {
       {.name = "t", .components = 1, .data = record->time},
       {.name = "q", .components = model->size.r, .data = record->q, .numbered = true},
@@ -153,8 +154,12 @@ static ep_status write_csv(const char *folder, const ep_model *model, const ep_r
        .components = record->weights ? model->size.k + 1 : 0,
        .data = record->weights,
        .numbered = true},
+      {.name = "g",
+       .components = green ? model->size.k : 0,
+       .data = record->green_weights,
+       .numbered = true},
   };
-  return ep_csv_write(path, record->rows, 3, groups, err);
+  return ep_csv_write(path, record->rows, 4, groups, err);
 }
 
 ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_shapes *shapes,
@@ -187,12 +192,19 @@ static double number(const json_t *object, const char *key) {
 
 static void text_weights(FILE *out, const json_t *report) {
   const json_t *weights = json_object_get(report, "weights");
-  if (json_array_size(weights) == 0) return;
-  fprintf(out, "final weights: rest %.3f", json_number_value(json_array_get(weights, 0)));
-  for (size_t i = 1; i < json_array_size(weights); i++)
-    fprintf(out, ", example %zu %.3f", i, json_number_value(json_array_get(weights, i)));
-  fprintf(out, "\nexample fraction: %.3f of the way from rest to the nearest example\n",
-          number(report, "example_fraction"));
+  const json_t *green = json_object_get(report, "green_weights");
+  for (size_t i = 0; i < json_array_size(weights); i++) {
+    fprintf(out, i ? ", example %zu" : "final weights: rest", i);
+    fprintf(out, " %.3f", json_number_value(json_array_get(weights, i)));
+  }
+  if (json_array_size(weights)) fprintf(out, "\n");
+  for (size_t i = 0; i < json_array_size(green); i++)
+    fprintf(out, "%s example %zu %.3f", i ? "," : "final Green-strain weights:", i + 1,
+            json_number_value(json_array_get(green, i)));
+  if (json_array_size(green)) fprintf(out, "\n");
+  if (number(report, "examples") > 0)
+    fprintf(out, "example fraction: %.3f of the way from rest to the nearest example\n",
+            number(report, "example_fraction"));
 }
 
 void ep_summary_text(FILE *out, const json_t *report) {

@@ -10,9 +10,9 @@
 // Raised whenever a stage computes something else from the same input: old results are then not
 // found any more.
 static const int stage_version[] = {
-    [EP_STAGE_EIGEN] = 1,    [EP_STAGE_MAP] = 2,   [EP_STAGE_POSES] = 2,
-    [EP_STAGE_MODES] = 1,    [EP_STAGE_PATHS] = 1, [EP_STAGE_BASIS] = 1,
-    [EP_STAGE_CUBATURE] = 1, [EP_STAGE_MODEL] = 1, [EP_STAGE_TARGET] = 1,
+    [EP_STAGE_EIGEN] = 1, [EP_STAGE_MAP] = 2,    [EP_STAGE_POSES] = 2,    [EP_STAGE_MODES] = 1,
+    [EP_STAGE_PATHS] = 1, [EP_STAGE_BASIS] = 1,  [EP_STAGE_CUBATURE] = 1, [EP_STAGE_GREEN] = 1,
+    [EP_STAGE_MODEL] = 2, [EP_STAGE_TARGET] = 1,
 };
 
 // Matching raises the number of functions to 20 (DESIGN "Maps"), coupling uses 2 m.
@@ -31,7 +31,7 @@ const char *ep_stage_kind_name(ep_stage_kind kind) {
       [EP_STAGE_POSES] = "poses",          [EP_STAGE_MODES] = "modes",
       [EP_STAGE_PATHS] = "paths",          [EP_STAGE_BASIS] = "basis",
       [EP_STAGE_CUBATURE] = "cubature",    [EP_STAGE_MODEL] = "model",
-      [EP_STAGE_TARGET] = "interpolation",
+      [EP_STAGE_TARGET] = "interpolation", [EP_STAGE_GREEN] = "green",
   };
   return names[kind];
 }
@@ -87,7 +87,9 @@ static void plan_eigen(planner *p) {
   for (int i = 0; i < shapes->count; i++) {
     const ep_shape_file *shape = &shapes->shape[i];
     if (!shape->needs_lb) {
-      add(p, EP_STAGE_EIGEN, shape->name, false, "same connectivity: vertices correspond already");
+      add(p, EP_STAGE_EIGEN, shape->name, false,
+          i ? "same connectivity: vertices correspond already"
+            : "same connectivity, and the Green-strain path needs no descriptors");
       continue;
     }
     const int wanted = maps ? larger(MATCH_FUNCTIONS, 2 * m) : m;
@@ -266,13 +268,40 @@ static void plan_cubature(planner *p) {
   stage->key = ep_hash_done(&text);
 }
 
+static bool uses_descriptors(const planner *p) {
+  return p->shapes->examples && (p->scene->methods & EP_METHOD_LB);
+}
+
+static void plan_green(planner *p) {
+  const ep_scene *scene = p->scene;
+  if (!p->shapes->examples || !(scene->methods & EP_METHOD_GREEN)) {
+    add(p, EP_STAGE_GREEN, NULL, false, "%s",
+        p->shapes->examples ? "examples.path is lb" : "no examples");
+    return;
+  }
+  ep_stage *stage = add(p, EP_STAGE_GREEN, NULL, true,
+                        "weights of %d example%s as quadratic forms, explicit in every step",
+                        p->shapes->examples, p->shapes->examples > 1 ? "s" : "");
+  ep_hash_text text = key_of(stage->kind);
+  add_stage_key(p, &text, EP_STAGE_BASIS);
+  add_stage_key(p, &text, EP_STAGE_CUBATURE);
+  for (int i = 0; i < scene->nfamilies; i++) {
+    const ep_family *f = &scene->family[i];
+    if (f->has_region)
+      ep_hash_add_bytes(&text, f->name, p->shapes->region[i], (size_t)p->shapes->shape[0].mesh.nv);
+  }
+  stage->key = ep_hash_done(&text);
+}
+
 static void plan_model(planner *p) {
   ep_stage *stage = add(p, EP_STAGE_MODEL, NULL, true, "everything a run needs, in one file");
   ep_hash_text text = key_of(stage->kind);
   add_stage_key(p, &text, EP_STAGE_BASIS);
   add_stage_key(p, &text, EP_STAGE_CUBATURE);
-  ep_hash_add(&text, "m=%d %s", p->shapes->examples ? p->scene->eigenfunctions : 0,
-              p->shapes->examples ? ep_plan_eigen(p->plan, 0)->key.hex : "none");
+  const bool descriptors = uses_descriptors(p);
+  ep_hash_add(&text, "m=%d %s", descriptors ? p->scene->eigenfunctions : 0,
+              descriptors ? ep_plan_eigen(p->plan, 0)->key.hex : "none");
+  add_stage_key(p, &text, EP_STAGE_GREEN);
   stage->key = ep_hash_done(&text);
 }
 
@@ -280,6 +309,9 @@ static void plan_target(planner *p) {
   const int k = p->shapes->examples;
   if (!k)
     add(p, EP_STAGE_TARGET, NULL, false, "no examples: nothing to interpolate in a step");
+  else if (!uses_descriptors(p))
+    add(p, EP_STAGE_TARGET, NULL, false,
+        "examples.path is green: weights are explicit, nothing is interpolated in a step");
   else if (p->scene->strength == 0)
     add(p, EP_STAGE_TARGET, NULL, false, "examples.strength is 0: examples are only measured");
   else
@@ -302,6 +334,7 @@ static ep_status fill(planner *p) {
   plan_paths(p);
   plan_basis(p);
   plan_cubature(p);
+  plan_green(p);
   plan_model(p);
   plan_target(p);
   return EP_OK;

@@ -94,7 +94,7 @@ static json_t *make_report(const ep_session *session, const ep_model_file *file,
   json_object_set_new(report, "vertices", json_integer(model->size.n));
   json_object_set_new(report, "tets", json_integer(model->size.nt));
   json_object_set_new(report, "examples", json_integer(model->size.k));
-  json_object_set_new(report, "m", json_integer(model->size.k ? scene->eigenfunctions : 0));
+  json_object_set_new(report, "m", json_integer(model->size.m ? scene->eigenfunctions : 0));
   json_object_set_new(report, "r", json_integer(model->size.r));
   json_object_set_new(report, "s", json_integer(model->size.s));
   json_object_set_new(report, "dt", json_real(scene->dt));
@@ -106,6 +106,11 @@ static json_t *make_report(const ep_session *session, const ep_model_file *file,
                         ? ep_json_numbers(k + 1, record->weights + (size_t)last * (size_t)(k + 1))
                         : json_array();
   json_object_set_new(report, "weights", weights);
+  if (record->green_weights && last >= 0) {
+    json_object_set_new(report, "alpha", json_real(scene->green.alpha));
+    json_object_set_new(report, "green_weights",
+                        ep_json_numbers(k, record->green_weights + (size_t)last * (size_t)k));
+  }
   json_object_set_new(report, "cubature_error",
                       json_pack("{s:o, s:o}", "train", ep_json_number(file->train_error),
                                 "held_out", ep_json_number(file->held_out_error)));

@@ -147,6 +147,12 @@ static ep_status read_family(const reader *r, unsigned index, const raw_family *
     out->poses++;
     EP_TRY(file(r, key, raw->poses[i], &out->pose[i]));
   }
+  if (raw->region) {
+    snprintf(key, sizeof key, "families.%u.region", index);
+    out->has_region = true;
+    EP_TRY(
+        selection(r, key, raw->region->box, raw->region->plane, raw->region->file, &out->region));
+  }
   if (!raw->map) return EP_OK;
   out->accept = raw->map->accept && *raw->map->accept;
   snprintf(key, sizeof key, "families.%u.map.regions", index);
@@ -250,12 +256,30 @@ static ep_status read_loads(const reader *r, const raw_scene *raw, ep_scene *out
   return EP_OK;
 }
 
+// A scene may hold the keys of both paths, so that --set examples.path can switch between them.
+static ep_status read_path(const reader *r, const raw_examples *raw, ep_scene *out) {
+  out->methods = raw->path ? *raw->path : EP_METHOD_LB;
+  const raw_constraints none = {0}, *weak = raw->constraints ? raw->constraints : &none;
+  const bool green = out->methods & EP_METHOD_GREEN;
+  for (int i = 0; i < out->nfamilies; i++)
+    if (out->family[i].has_region && out->methods != EP_METHOD_GREEN)
+      return bad(r, out->family[i].region.key,
+                 "regions of examples need examples.path: green in this version");
+  if (!green) return EP_OK;
+  EP_TRY(number(r, "examples.alpha", raw->alpha, 0.5, 0, 1, &out->green.alpha));
+  EP_TRY(number(r, "examples.constraints.sum_to_one", weak->sum_to_one, 0, 0, 1e6,
+                &out->green.sum_to_one));
+  return number(r, "examples.constraints.non_negative", weak->non_negative, 0, 0, 1e6,
+                &out->green.non_negative);
+}
+
 static ep_status read_rest(const reader *r, const raw_scene *raw, ep_scene *out) {
   const raw_examples no_examples = {0};
   const raw_examples *examples = raw->examples ? raw->examples : &no_examples;
   EP_TRY(number(r, "examples.strength", examples->strength, 1, 0, 1e4, &out->strength));
   out->force = examples->force ? (ep_example_force)*examples->force : EP_EXAMPLE_ENERGY;
   out->solver = examples->solver ? (ep_solver)*examples->solver : EP_SOLVER_NLOPT;
+  EP_TRY(read_path(r, examples, out));
   const raw_output *output = raw->output;
   EP_TRY(whole(r, "output.every", output ? output->every : NULL, 2, 1, 1000000, &out->every));
   out->formats = EP_FORMAT_VTU | EP_FORMAT_GLB | EP_FORMAT_PNG;
@@ -328,6 +352,7 @@ void ep_scene_free(ep_scene *scene) {
     free(family->name);
     free(family->rest);
     free(family->regions);
+    free(family->region.path);
   }
   free(scene->fixed);
   free(scene->load);

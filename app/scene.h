@@ -9,6 +9,8 @@
 #include "mesh/mesh.h"
 #include "reduced/eigenpose.h"
 
+// How examples act: shape interpolation in descriptor space, Green-strain potential. Bits.
+enum { EP_METHOD_LB = 1, EP_METHOD_GREEN = 2 };
 typedef enum ep_solver { EP_SOLVER_NLOPT, EP_SOLVER_NEWTON } ep_solver;
 enum { EP_FORMAT_VTU = 1, EP_FORMAT_GLB = 2, EP_FORMAT_PNG = 4 }; // bits of ep_scene.formats
 
@@ -28,6 +30,8 @@ typedef struct ep_family {
   char **pose;   // (poses)
   char *regions; // NULL: automatic map
   bool accept;   // go on with a bad map
+  bool has_region;
+  ep_selection region; // vertices where the poses act (Green-strain path); else everywhere
 } ep_family;
 
 typedef struct ep_load {
@@ -56,6 +60,8 @@ typedef struct ep_scene {
   double strength;
   ep_example_force force;
   ep_solver solver;
+  int methods;    // EP_METHOD bits
+  ep_green green; // alpha 0 without EP_METHOD_GREEN
   int nloads;
   ep_load *load;
   int every;

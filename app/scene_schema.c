@@ -30,6 +30,11 @@ static const cyaml_strval_t solver_names[] = {
     {"nlopt", EP_SOLVER_NLOPT},
     {"newton", EP_SOLVER_NEWTON},
 };
+static const cyaml_strval_t path_names[] = {
+    {"lb", EP_METHOD_LB},
+    {"green", EP_METHOD_GREEN},
+    {"both", EP_METHOD_LB | EP_METHOD_GREEN},
+};
 static const cyaml_strval_t format_names[] = {
     {"vtu", EP_FORMAT_VTU},
     {"glb", EP_FORMAT_GLB},
@@ -79,6 +84,7 @@ static const cyaml_schema_field_t family_fields[] = {
     TEXT(raw_family, rest),
     CYAML_FIELD_SEQUENCE("poses", CYAML_FLAG_POINTER, raw_family, poses, &text, 1, 64),
     PART(raw_family, map, map_fields),
+    PART(raw_family, region, selection_fields),
     CYAML_FIELD_END,
 };
 static const cyaml_schema_value_t family = {
@@ -103,8 +109,17 @@ static const cyaml_schema_field_t simulation_fields[] = {
     CYAML_FIELD_END,
 };
 
+static const cyaml_schema_field_t constraints_fields[] = {
+    NUMBER(raw_constraints, sum_to_one),
+    NUMBER(raw_constraints, non_negative),
+    CYAML_FIELD_END,
+};
 static const cyaml_schema_field_t examples_fields[] = {
     NUMBER(raw_examples, strength),
+    NUMBER(raw_examples, alpha),
+    CYAML_FIELD_ENUM_PTR("path", OPTIONAL | CYAML_FLAG_STRICT, raw_examples, path, path_names,
+                         CYAML_ARRAY_LEN(path_names)),
+    PART(raw_examples, constraints, constraints_fields),
     CYAML_FIELD_ENUM_PTR("force", OPTIONAL | CYAML_FLAG_STRICT, raw_examples, force, force_names,
                          CYAML_ARRAY_LEN(force_names)),
     CYAML_FIELD_ENUM_PTR("solver", OPTIONAL | CYAML_FLAG_STRICT, raw_examples, solver, solver_names,

@@ -35,6 +35,7 @@ typedef struct raw_family {
   char **poses;
   unsigned poses_count;
   raw_map *map;
+  raw_selection *region;
 } raw_family;
 typedef struct raw_reduction {
   double *eigenfunctions, *modes, *linear_modes, *path_samples, *elements, *training_poses;
@@ -47,9 +48,13 @@ typedef struct raw_simulation {
   double *dt, *steps;
   raw_damping *damping;
 } raw_simulation;
+typedef struct raw_constraints {
+  double *sum_to_one, *non_negative;
+} raw_constraints;
 typedef struct raw_examples {
-  double *strength;
-  int *force, *solver;
+  double *strength, *alpha;
+  int *force, *solver, *path;
+  raw_constraints *constraints;
 } raw_examples;
 typedef struct raw_push {
   raw_box *box;

@@ -80,11 +80,24 @@ static ep_status choose_material(const ep_scene *scene, ep_shapes *out, ep_error
   return EP_OK;
 }
 
-static void mark_lb(ep_shapes *out) {
+static ep_status select_regions(const ep_scene *scene, ep_shapes *out, ep_error *err) {
+  const ep_mesh *mesh = &out->shape[0].mesh;
+  for (int i = 0; i < scene->nfamilies; i++) {
+    int count;
+    if (!scene->family[i].has_region) continue;
+    out->region[i] = calloc((size_t)mesh->nv, 1);
+    if (!out->region[i]) return ep_fail(err, EP_ERR_MEMORY, "no memory for a region");
+    EP_TRY(ep_select_vertices(&scene->family[i].region, mesh, out->region[i], &count, err));
+  }
+  return EP_OK;
+}
+
+static void mark_lb(const ep_scene *scene, ep_shapes *out) {
   for (int i = 0; i < out->examples; i++) {
     const ep_pose_source *example = &out->example[i];
-    out->shape[0].needs_lb = true; // descriptors c(q) = c0 + T q
+    if (scene->methods & EP_METHOD_LB) out->shape[0].needs_lb = true; // descriptors c(q) = c0 + T q
     if (example->route == EP_ROUTE_SAME) continue;
+    out->shape[0].needs_lb = true; // the pose's coefficients
     if (!example->rest_same) out->shape[example->rest].needs_lb = true;
     if (!example->pose_same)
       out->shape[example->rest].needs_lb = out->shape[example->shape].needs_lb = true;
@@ -97,10 +110,12 @@ ep_status ep_shapes_read(const ep_scene *scene, ep_log *log, ep_shapes *out, ep_
   const size_t most = 1 + (size_t)scene->nfamilies + (size_t)examples;
   out->shape = calloc(most, sizeof *out->shape);
   out->rest = calloc((size_t)scene->nfamilies + 1, sizeof *out->rest);
+  out->region = calloc((size_t)scene->nfamilies + 1, sizeof *out->region);
+  out->families = scene->nfamilies;
   out->example = calloc((size_t)examples + 1, sizeof *out->example);
   ep_status status = EP_OK;
   int object;
-  if (!out->shape || !out->rest || !out->example)
+  if (!out->shape || !out->rest || !out->example || !out->region)
     status = ep_fail(err, EP_ERR_MEMORY, "no memory for %zu meshes", most);
   if (status == EP_OK) status = read_shape(scene->mesh, NULL, true, log, out, &object, err);
   for (int i = 0; i < scene->nfamilies && status == EP_OK; i++)
@@ -108,7 +123,8 @@ ep_status ep_shapes_read(const ep_scene *scene, ep_log *log, ep_shapes *out, ep_
   if (status == EP_OK) status = choose_material(scene, out, err);
   if (status == EP_OK)
     status = ep_select_fixed(scene, &out->shape[0].mesh, &out->nfixed, &out->fixed, err);
-  if (status == EP_OK) mark_lb(out);
+  if (status == EP_OK) status = select_regions(scene, out, err);
+  if (status == EP_OK) mark_lb(scene, out);
   if (status != EP_OK) ep_shapes_free(out);
   return status;
 }
@@ -119,6 +135,8 @@ void ep_shapes_free(ep_shapes *shapes) {
   free(shapes->rest);
   free(shapes->example);
   free(shapes->fixed);
+  for (int i = 0; shapes->region && i < shapes->families; i++) free(shapes->region[i]);
+  free(shapes->region);
   memset(shapes, 0, sizeof *shapes);
 }
 

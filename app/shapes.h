@@ -33,7 +33,9 @@ typedef struct ep_shapes {
   int examples;
   ep_pose_source *example; // (examples) in order of the scene
   int nfixed, *fixed;      // ascending vertices of the object
-  int nmaterials;          // constants to use (scene before mesh file)
+  int families;
+  unsigned char **region; // (families) marks of the vertices a family acts on, NULL: everywhere
+  int nmaterials;         // constants to use (scene before mesh file)
   const ep_elastic *material;
   ep_digest physics; // hash of material model, constants and their place
 } ep_shapes;

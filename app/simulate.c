@@ -121,9 +121,11 @@ static ep_status make_record(const ep_scene *scene, const ep_model *model, ep_re
   out->q = calloc(rows * r, sizeof *out->q);
   out->step_ms = calloc(rows, sizeof *out->step_ms);
   out->target_ms = calloc(rows, sizeof *out->target_ms);
-  if (model->size.k) out->weights = calloc(rows * shapes, sizeof *out->weights);
-  const bool good =
-      out->time && out->q && out->step_ms && out->target_ms && (out->weights || !model->size.k);
+  const bool lb = model->size.k && model->size.m, green = model->size.greens > 0;
+  if (lb) out->weights = calloc(rows * shapes, sizeof *out->weights);
+  if (green) out->green_weights = calloc(rows * shapes, sizeof *out->green_weights);
+  const bool good = out->time && out->q && out->step_ms && out->target_ms &&
+                    (out->weights || !lb) && (out->green_weights || !green);
   if (good) return EP_OK;
   ep_record_free(out);
   return ep_fail(err, EP_ERR_MEMORY, "no memory for %d steps of %d modes", scene->steps,
@@ -150,6 +152,12 @@ static ep_status note(simulation *s, const ep_mesh *mesh, double *x) {
     const ep_status status =
         note_weights(s, record->weights + row * (size_t)(s->model->size.k + 1));
     if (status != EP_OK) return status;
+  }
+  if (record->green_weights) {
+    const size_t k = (size_t)s->model->size.k;
+    ep_green_energy(s->state, &s->scene->green, ep_state_q(s->state), NULL, NULL);
+    memcpy(record->green_weights + row * k, ep_state_green_weights(s->state),
+           k * sizeof *record->green_weights);
   }
   ep_positions(s->model, ep_state_q(s->state), x);
   const int inverted = ep_mesh_inverted(mesh, x, NULL);
@@ -193,7 +201,8 @@ static void set_up_step(simulation *s, ep_nlopt_target *nlopt) {
   s->def.force = s->force;
   s->def.damping_mass = scene->damping_mass;
   s->def.damping_stiffness = scene->damping_stiffness;
-  s->def.strength = s->model->size.k ? scene->strength : 0;
+  s->def.strength = s->model->size.k && (scene->methods & EP_METHOD_LB) ? scene->strength : 0;
+  s->def.green = scene->green;
   s->def.example_force = scene->force;
   s->solver.solve = nlopt ? ep_nlopt_target_solve : ep_target_newton;
   s->solver.user = nlopt;
@@ -215,7 +224,7 @@ ep_status ep_simulate(const ep_scene *scene, const ep_shapes *shapes, const ep_m
     if (status != EP_OK) ep_fail(err, status, "cannot set up a state of the model");
   }
   if (status == EP_OK) status = make_loads(&s, shapes, err);
-  if (status == EP_OK && model->size.k && scene->solver == EP_SOLVER_NLOPT)
+  if (status == EP_OK && model->size.k && model->size.m && scene->solver == EP_SOLVER_NLOPT)
     status = ep_nlopt_target_create(s.state, NULL, 0, &nlopt, err);
   if (status == EP_OK) {
     set_up_step(&s, nlopt);
@@ -233,6 +242,7 @@ void ep_record_free(ep_record *record) {
   free(record->time);
   free(record->q);
   free(record->weights);
+  free(record->green_weights);
   free(record->step_ms);
   free(record->target_ms);
   memset(record, 0, sizeof *record);

@@ -6,14 +6,16 @@
 #include "app/shapes.h"
 
 typedef struct ep_record {
-  int rows;          // steps done + 1 (row 0 is rest)
-  double *time;      // (rows) [s]
-  double *q;         // (rows x r)
-  double *weights;   // (rows x (k + 1)), the rest shape's first; NULL without examples
-  double *step_ms;   // (rows - 1) wall time of each step, interpolation included
-  double *target_ms; // (rows - 1) of the interpolation alone
-  int max_inverted;  // most inverted tets after any step
-  int halvings;      // steps that had to be halved
+  int rows;     // steps done + 1 (row 0 is rest)
+  double *time; // (rows) [s]
+  double *q;    // (rows x r)
+  double
+      *weights; // (rows x (k + 1)), the rest shape's first; NULL without the path over descriptors
+  double *green_weights; // (rows x k) of the Green-strain path; NULL without it
+  double *step_ms;       // (rows - 1) wall time of each step, interpolation included
+  double *target_ms;     // (rows - 1) of the interpolation alone
+  int max_inverted;      // most inverted tets after any step
+  int halvings;          // steps that had to be halved
   int newton_iterations, target_evaluations; // over the run
 } ep_record;
 
