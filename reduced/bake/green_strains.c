@@ -78,9 +78,9 @@ static void report(const ep_green_space *s, ep_log *log) {
   for (int j = 0; j < s->k; j++)
     if (s->apart[j] < 10 * DEPENDENT)
       ep_warn(log,
-              "Green-strain path: example %d is (nearly) a combination of the others (%.1e of its "
-              "strain energy is its own); weights are shared among such examples",
-              j + 1, s->apart[j]);
+              "Green-strain path: example %d is (nearly) a combination of the others (less than "
+              "%.0e of its strain energy is its own); weights are shared among such examples",
+              j + 1, 10 * DEPENDENT);
   ep_notice(log, "Green-strain path: %d of %d examples' strains are independent", s->count, s->k);
 }
 
