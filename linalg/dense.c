@@ -25,6 +25,11 @@ void ep_gemm_nt(int m, int n, int k, const double *a, const double *b, double *c
               at_least_one(k), 0, c, at_least_one(n));
 }
 
+void ep_syrk_tn(int n, int k, const double *a, int add, double *c) {
+  cblas_dsyrk(CblasRowMajor, CblasLower, CblasTrans, n, k, 1, a, at_least_one(n), add ? 1 : 0, c,
+              at_least_one(n));
+}
+
 // LAPACK may loop for ever or answer nonsense when it meets a NaN.
 static ep_status require_finite(const char *what, int m, int n, const double *a, ep_error *err) {
   for (size_t i = 0; i < (size_t)m * (size_t)n; i++)
