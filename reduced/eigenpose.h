@@ -133,6 +133,10 @@ typedef struct ep_step_def {
   double damping_mass;            // Rayleigh alpha [1/s]
   double damping_stiffness;       // Rayleigh beta [s], against K0
   double strength;                // example strength; 1: as stiff as the material itself; 0: none
+  double relief;                  // share of the material's own energy left out while an example
+                                  // force acts, 0 (default) to 1: the object then yields along the
+                                  // examples (stiffness 1 - relief) and keeps 1 - relief + strength
+                                  // across them (Zhang et al. 2015 eq. 3 has relief = strength)
   ep_green green; // Green-strain potential (alpha 0: none). StVK: W + alpha W_a; another material:
                   // (1 - alpha) W + alpha (W_StVK with volume penalty + W_a)
   ep_example_force example_force; // energy (target as undeformed shape) or strength K0 (q_t - q)

@@ -22,9 +22,9 @@ ep_step_def ep_default_step(void) {
 int ep_step_def_valid(const ep_step_def *d) {
   return d->cookie == COOKIE && d->dt > 0 && isfinite(d->dt) && d->damping_mass >= 0 &&
          isfinite(d->damping_mass) && d->damping_stiffness >= 0 && isfinite(d->damping_stiffness) &&
-         d->strength >= 0 && isfinite(d->strength) && d->tolerance > 0 && d->target_tolerance > 0 &&
-         d->max_iterations > 0 && ep_green_valid(&d->green) &&
-         ep_integrator_name(d->integrator) != NULL &&
+         d->strength >= 0 && isfinite(d->strength) && d->relief >= 0 && d->relief <= 1 &&
+         d->tolerance > 0 && d->target_tolerance > 0 && d->max_iterations > 0 &&
+         ep_green_valid(&d->green) && ep_integrator_name(d->integrator) != NULL &&
          (d->example_force == EP_EXAMPLE_ENERGY || d->example_force == EP_EXAMPLE_LINEAR);
 }
 
@@ -57,7 +57,8 @@ static double inner_energy(step *s, const double *x, double *g, double *h, int p
   ep_state *state = s->state;
   const ep_step_def *def = s->def;
   const int as_energy = s->examples && def->example_force == EP_EXAMPLE_ENERGY;
-  state->term[0] = (ep_kernel_term){.scale = ep_green_share(state->model, &def->green),
+  state->term[0] = (ep_kernel_term){.scale = ep_green_share(state->model, &def->green) *
+                                             (s->examples ? 1 - def->relief : 1),
                                     .weight = state->model->cubature_w};
   if (as_energy)
     state->term[1] = (ep_kernel_term){

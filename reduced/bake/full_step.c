@@ -160,12 +160,19 @@ static void lift(const ep_full *full, const double *f, double *g) {
     ep_axpy((size_t)full->n3, f[a], full->mu + (size_t)a * (size_t)full->n3, g);
 }
 
-// W(x) + beta W_t(U^T M x), gradient into g (3n) unless NULL.
+// What is left of the material's own energy beside the example force.
+static double material_share(const step *s) {
+  return s->full->examples && s->def->strength > 0 ? 1 - s->def->relief : 1;
+}
+
+// (1 - relief) W(x) + beta W_t(U^T M x), gradient into g (3n) unless NULL.
 static double inner_energy(step *s, const double *x, double *g) {
   ep_full *full = s->full;
-  s->elastic = ep_fem_energy(full->fem, x);
+  const double share = material_share(s);
+  s->elastic = share * ep_fem_energy(full->fem, x);
   s->example = 0;
   if (g) ep_fem_force(full->fem, x, g);
+  for (int i = 0; g && share != 1 && i < full->n3; i++) g[i] *= share;
   if (full->examples) {
     to_coordinates(full, x);
     s->example =
@@ -232,6 +239,8 @@ static ep_status factorise(step *s, int project, ep_error *err) {
   ep_full *full = s->full;
   const size_t entries = (size_t)full->k.start[full->n3];
   ep_fem_stiffness(full->fem, full->x, project, &full->k);
+  const double share = material_share(s);
+  for (size_t i = 0; share != 1 && i < entries; i++) full->k.value[i] *= share;
   ep_axpy(entries, s->inertia + s->rate * s->def->damping_mass, full->mass.value, full->k.value);
   ep_axpy(entries, s->rate * s->def->damping_stiffness, full->k0.value, full->k.value);
   if (full->examples) {

@@ -239,7 +239,7 @@ static void complete_basis_with_examples(void **state) {
     make_complete(&guide, EP_STABLE_NEOHOOKEAN, 1);
     ep_step_def def = exact_step(EP_BDF2, 0.01);
     def.example_force = (ep_example_force)force;
-    def.strength = 0.7;
+    def.strength = 0.7, def.relief = 0.3;
     ASSERT_LESS(difference_of_runs(&c, &guide, &def, 25, &moved), 1e-8);
     ASSERT_LESS(0.02, moved);
     ASSERT_LESS(1e-3, ep_state_weights(c.state)[0] + ep_state_weights(c.state)[1]);
