@@ -60,6 +60,7 @@ typedef struct ep_frame_candidate {
   double distance;    // rms distance of the mapped points, over the rms radius, frames aligned
   double cycle;       // round trip, as in the record
   double landmark;    // rms distance of the landmarks' images from where they belong; -1 without
+  int rounds;         // how often it was turned to what its map said
   bool chosen, rival; // the map's own frame; another one that is not clearly worse
 } ep_frame_candidate;
 

@@ -22,6 +22,11 @@ double ep_frame_angle(const double r[9]) {
   return atan2(sine, r[0] + r[4] + r[8] - 1) * 180 / acos(-1);
 }
 
+double ep_frame_determinant(const double a[9]) {
+  return a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) +
+         a[2] * (a[3] * a[7] - a[4] * a[6]);
+}
+
 void ep_frame_multiply(const double a[9], const double b[9], double out[9]) {
   double c[9];
   for (int i = 0; i < 3; i++)
@@ -136,37 +141,33 @@ ep_status ep_frame_from_regions(const ep_side *from, const ep_side *to, const un
   return status;
 }
 
-ep_status ep_frame_from_map(const ep_side *from, const ep_side *to, const int *p, double r[9],
-                            ep_error *err) {
+ep_status ep_frame_from_map(const ep_side *from, const ep_side *to, const int *p, bool mirrored,
+                            double r[9], ep_error *err) {
   double *image = malloc(3 * (size_t)from->n * sizeof *image);
   if (!image) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d points", from->n);
+  const double side = mirrored ? -1 : 1;
   for (int i = 0; i < from->n; i++)
-    memcpy(image + 3 * (size_t)i, to->x + 3 * (size_t)p[i], 3 * sizeof(double));
+    for (int c = 0; c < 3; c++) image[3 * (size_t)i + c] = side * to->x[3 * (size_t)p[i] + c];
   double cx[3], cy[3];
   const ep_status status = ep_kabsch(from->n, image, from->x, from->share, r, cx, cy, err);
+  for (int c = 0; c < 9; c++) r[c] *= side;
   free(image);
   return status;
 }
 
-static double determinant(const double a[9]) {
-  return a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) +
-         a[2] * (a[3] * a[7] - a[4] * a[6]);
-}
-
-// Principal axes as rows of a proper rotation.
-static ep_status principal_axes(const ep_side *side, double v[9], ep_error *err) {
-  double s[9], lambda[3];
+ep_status ep_frame_axes(const ep_side *side, double v[9], double variance[3], ep_error *err) {
+  double s[9];
   second_moment(side->n, side->x, side->share, s);
-  EP_TRY(ep_eigen_symmetric(3, s, lambda, v, err));
-  if (determinant(v) < 0)
+  EP_TRY(ep_eigen_symmetric(3, s, variance, v, err));
+  if (ep_frame_determinant(v) < 0)
     for (int c = 0; c < 3; c++) v[6 + c] = -v[6 + c];
   return EP_OK;
 }
 
 ep_status ep_frame_from_axes(const ep_side *from, const ep_side *to, double r[9], ep_error *err) {
-  double vf[9], vt[9], back[9], least = 1000;
-  EP_TRY(principal_axes(from, vf, err));
-  EP_TRY(principal_axes(to, vt, err));
+  double vf[9], vt[9], back[9], variance[3], least = 1000;
+  EP_TRY(ep_frame_axes(from, vf, variance, err));
+  EP_TRY(ep_frame_axes(to, vt, variance, err));
   ep_frame_transpose(vf, back);
   for (int flip = 0; flip < 4; flip++) {
     const double sign[3] = {flip & 1 ? -1 : 1, flip & 2 ? -1 : 1,

@@ -10,14 +10,11 @@
 static const double GAMMA_SHAPES = 4, GAMMA_FAMILY = 2;
 enum { FUNCTIONS_SHAPES = 12, FUNCTIONS_FAMILY = 20 };
 static const double REGION_WEIGHT = 2; // measured useful: 1 to 3
+static const double MARK_WEIGHT = 2;
 // Reframing (step 4): at most so many rounds, until the frame turns by less.
 enum { REFRAME_ROUNDS = 4, DROP_ROUNDS = 3 };
-static const double REFRAME_DEGREES = 5;
 // Above this round trip plain nearest neighbours are tried as well (step 5).
 static const double CYCLE_FALLBACK = 0.3;
-// Another start than the authored frame must be better by this factor.
-static const double CYCLE_CLEARLY = 0.8;
-
 ep_map_options ep_default_map_options(void) {
   return (ep_map_options){.m = 10, .to_column = 1};
 }
@@ -47,46 +44,13 @@ void ep_map_pull(const ep_map *map, const ep_mesh *to, int width, const double *
   }
 }
 
-// One trial: a map there and back in its final frame.
-typedef struct trial {
-  double r[9], cycle;
-  int rounds;
-  int *p, *back;
-  int *tet;       // (from->n)
-  double *weight; // (from->n x 4)
-} trial;
-
 typedef struct job {
   const ep_map_options *options;
   ep_side from, to;
   unsigned char *use; // (regions) that take part, NULL without regions
   ep_log *log;
+  ep_candidates candidates;
 } job;
-
-static ep_status make_trial(const job *j, trial *t, ep_error *err) {
-  memset(t, 0, sizeof *t);
-  t->p = malloc((size_t)j->from.n * sizeof *t->p);
-  t->back = malloc((size_t)j->to.n * sizeof *t->back);
-  t->tet = malloc((size_t)j->from.n * sizeof *t->tet);
-  t->weight = malloc(4 * (size_t)j->from.n * sizeof *t->weight);
-  return t->p && t->back && t->tet && t->weight
-             ? EP_OK
-             : ep_fail(err, EP_ERR_MEMORY, "no memory for a map");
-}
-
-static void free_trial(trial *t) {
-  free(t->p);
-  free(t->back);
-  free(t->tet);
-  free(t->weight);
-  memset(t, 0, sizeof *t);
-}
-
-static void take_trial(trial *into, trial *better) {
-  const trial old = *into;
-  *into = *better;
-  *better = old;
-}
 
 static ep_match_rule rule_of(const job *j) {
   const bool family = j->options->same_family;
@@ -95,80 +59,158 @@ static ep_match_rule rule_of(const job *j) {
   return (ep_match_rule){.k = k < j->from.k ? k : j->from.k,
                          .gamma = family ? GAMMA_FAMILY : GAMMA_SHAPES,
                          .region_weight = j->use ? REGION_WEIGHT : 0,
+                         .mark_weight = j->options->landmarks ? MARK_WEIGHT : 0,
                          .use = j->use};
 }
 
-static double angle_between(const double a[9], const double b[9]) {
-  double back[9], turn[9];
-  ep_frame_transpose(b, back);
-  ep_frame_multiply(a, back, turn);
-  return ep_frame_angle(turn);
+// Samples on which frames are tried; on which sides with more vertices are matched first.
+enum { SCOUTS = 800, MATCH_SAMPLES = 4000 };
+
+typedef struct coarse_side {
+  ep_side side;
+  int *sample, *owner; // (side.n) vertices; (vertices) nearest sample
+} coarse_side;
+
+static void free_coarse(coarse_side *c) {
+  ep_side_free(&c->side);
+  free(c->sample);
+  free(c->owner);
 }
 
-// Match, turn the frame to what the map says, match again (step 4); then the way back (step 5).
-static ep_status match_from_frame(const job *j, trial *t, ep_error *err) {
-  const ep_match_rule rule = rule_of(j);
-  EP_TRY(ep_match_levels(&j->from, &j->to, t->r, &rule, t->p, t->tet, t->weight, err));
-  for (t->rounds = 0; t->rounds < REFRAME_ROUNDS; t->rounds++) {
-    double turned[9];
-    EP_TRY(ep_frame_from_map(&j->from, &j->to, t->p, turned, err));
-    if (angle_between(turned, t->r) < REFRAME_DEGREES) break;
-    memcpy(t->r, turned, sizeof turned);
-    EP_TRY(ep_match_levels(&j->from, &j->to, t->r, &rule, t->p, t->tet, t->weight, err));
+static ep_status coarsen(const ep_side *side, int most, coarse_side *out, ep_error *err) {
+  const int count = side->n < most ? side->n : most;
+  out->sample = malloc((size_t)count * sizeof *out->sample);
+  out->owner = malloc((size_t)side->n * sizeof *out->owner);
+  return out->sample && out->owner
+             ? ep_side_coarsen(side, count, &out->side, out->sample, out->owner, err)
+             : ep_fail(err, EP_ERR_MEMORY, "no memory for samples");
+}
+
+// Try the frames on samples; candidates' samples become vertices.
+static ep_status choose_frame(job *j, const ep_match_rule *rule, ep_error *err) {
+  coarse_side from = {0}, to = {0};
+  ep_candidates *c = &j->candidates;
+  ep_candidates_free(c);
+  ep_status status = coarsen(&j->from, SCOUTS, &from, err);
+  if (status == EP_OK) status = coarsen(&j->to, SCOUTS, &to, err);
+  if (status == EP_OK) status = ep_candidates_try(&from.side, &to.side, rule, j->options, c, err);
+  if (status == EP_OK && c->rivals) {
+    c->settle_from = from.sample[c->settle_from];
+    c->settle_to = to.sample[c->settle_to];
+    c->settle_other = to.sample[c->settle_other];
   }
+  free_coarse(&from);
+  free_coarse(&to);
+  return status;
+}
+
+// The map on samples of large sides, carried over to all vertices: p of t.
+static ep_status match_samples(const job *j, const ep_match_rule *rule, ep_trial *t,
+                               ep_error *err) {
+  coarse_side from = {0}, to = {0};
+  ep_trial c = {0};
+  ep_status status = coarsen(&j->from, MATCH_SAMPLES, &from, err);
+  if (status == EP_OK) status = coarsen(&j->to, MATCH_SAMPLES, &to, err);
+  if (status == EP_OK) status = ep_trial_make(&from.side, &to.side, &c, err);
+  if (status == EP_OK) {
+    memcpy(c.r, t->r, sizeof c.r);
+    status = ep_trial_run(&from.side, &to.side, rule, REFRAME_ROUNDS, &c, err);
+  }
+  if (status == EP_OK) {
+    memcpy(t->r, c.r, sizeof c.r);
+    t->rounds = c.rounds;
+    for (int i = 0; i < j->from.n; i++) t->p[i] = to.sample[c.p[from.owner[i]]];
+    for (int i = 0; i < j->to.n; i++) t->back[i] = from.sample[c.back[to.owner[i]]];
+  }
+  ep_trial_free(&c);
+  free_coarse(&from);
+  free_coarse(&to);
+  return status;
+}
+
+// Extend the samples' map to all vertices: the last level alone, both ways.
+static ep_status extend(const job *j, const ep_match_rule *rule, ep_trial *t, ep_error *err) {
   double back[9];
+  ep_match_rule last = *rule;
+  last.refine = true;
   ep_frame_transpose(t->r, back);
-  EP_TRY(ep_match_levels(&j->to, &j->from, back, &rule, t->back, NULL, NULL, err));
+  EP_TRY(ep_match_levels(&j->from, &j->to, t->r, &last, t->p, NULL, NULL, err));
+  EP_TRY(ep_match_levels(&j->to, &j->from, back, &last, t->back, NULL, NULL, err));
   t->cycle = ep_match_cycle(&j->from, t->p, t->back);
   return EP_OK;
 }
 
-// Turned poses: also start from matching principal axes; kept where the round trip is clearly
-// shorter.
-static ep_status try_axes(const job *j, trial *best, ep_error *err) {
-  trial t;
-  ep_status status = make_trial(j, &t, err);
-  if (status == EP_OK) status = ep_frame_from_axes(&j->from, &j->to, t.r, err);
-  if (status == EP_OK && angle_between(t.r, best->r) >= REFRAME_DEGREES) {
-    status = match_from_frame(j, &t, err);
-    if (status == EP_OK && t.cycle < CYCLE_CLEARLY * best->cycle) take_trial(best, &t);
-  }
-  free_trial(&t);
-  return status;
-}
-
-static ep_status try_plain(const job *j, trial *best, ep_error *err) {
-  trial t;
+// Nearest neighbours in space, kept where their round trip is shorter.
+static ep_status try_plain(const job *j, ep_trial *best, ep_error *err) {
+  ep_trial t;
   double back[9];
-  ep_status status = make_trial(j, &t, err);
-  if (status == EP_OK) {
-    memcpy(t.r, best->r, sizeof t.r);
-    t.rounds = best->rounds;
-    ep_frame_transpose(t.r, back);
-    status = ep_match_plain(&j->from, &j->to, t.r, t.p, t.tet, t.weight, err);
-  }
+  ep_status status = ep_trial_make(&j->from, &j->to, &t, err);
+  memcpy(t.r, best->r, sizeof t.r);
+  ep_frame_transpose(t.r, back);
+  if (status == EP_OK) status = ep_match_plain(&j->from, &j->to, t.r, t.p, NULL, NULL, err);
   if (status == EP_OK) status = ep_match_plain(&j->to, &j->from, back, t.back, NULL, NULL, err);
   if (status == EP_OK) {
     t.cycle = ep_match_cycle(&j->from, t.p, t.back);
-    if (t.cycle < best->cycle) take_trial(best, &t);
+    t.rounds = best->rounds;
+    t.plain = true;
+    if (t.cycle < best->cycle) {
+      const ep_trial old = *best;
+      *best = t;
+      t = old;
+    }
   }
-  free_trial(&t);
+  ep_trial_free(&t);
   return status;
 }
 
-static ep_status match_once(const job *j, trial *t, ep_error *err) {
-  bool found = false;
-  ep_frame_identity(t->r);
-  if (j->use) EP_TRY(ep_frame_from_regions(&j->from, &j->to, j->use, t->r, &found, err));
-  EP_TRY(match_from_frame(j, t, err));
-  if (j->options->same_family && !found) EP_TRY(try_axes(j, t, err));
+static ep_status match_once(job *j, ep_trial *t, ep_error *err) {
+  const ep_match_rule rule = rule_of(j);
+  EP_TRY(choose_frame(j, &rule, err));
+  const ep_frame_candidate *chosen = &j->candidates.frame[j->candidates.chosen];
+  memcpy(t->r, chosen->rotation, sizeof t->r);
+  t->plain = false;
+  if (j->from.n > MATCH_SAMPLES || j->to.n > MATCH_SAMPLES) {
+    EP_TRY(match_samples(j, &rule, t, err));
+    EP_TRY(extend(j, &rule, t, err));
+  } else {
+    EP_TRY(ep_trial_run(&j->from, &j->to, &rule, REFRAME_ROUNDS, t, err));
+  }
+  t->rounds += chosen->rounds;
   if (t->cycle > CYCLE_FALLBACK) EP_TRY(try_plain(j, t, err));
+  return EP_OK;
+}
+
+// Vertices to points in tets: last, because regions in wrong order pull a map farther with every
+// round.
+static ep_status make_finer(const job *j, ep_trial *t, int *tet, double *weight, ep_error *err) {
+  ep_match_rule rule = rule_of(j);
+  rule.refine = true;
+  if (t->plain)
+    EP_TRY(ep_match_plain(&j->from, &j->to, t->r, t->p, tet, weight, err));
+  else
+    EP_TRY(ep_match_levels(&j->from, &j->to, t->r, &rule, t->p, tet, weight, err));
+  t->cycle = ep_match_cycle(&j->from, t->p, t->back);
+  return EP_OK;
+}
+
+// The candidates into the record.
+static ep_status record_candidates(const job *j, ep_map_quality *q, ep_error *err) {
+  const ep_candidates *c = &j->candidates;
+  q->candidate = malloc((size_t)c->count * sizeof *q->candidate);
+  if (!q->candidate) return ep_fail(err, EP_ERR_MEMORY, "no memory for a record");
+  memcpy(q->candidate, c->frame, (size_t)c->count * sizeof *q->candidate);
+  q->candidates = c->count;
+  q->rivals = c->rivals;
+  q->settle_from = c->settle_from;
+  q->settle_to = c->settle_to;
+  q->settle_other = c->settle_other;
+  q->landmarks = j->options->landmarks;
   return EP_OK;
 }
 
 // Take regions out that the map contradicts. *dropped: how many; none where it would be half of
 // them or more: then the map is as likely wrong as the file.
-static ep_status drop_suspects(job *j, const trial *t, int *dropped, ep_error *err) {
+static ep_status drop_suspects(job *j, const ep_trial *t, int *dropped, ep_error *err) {
   const int count = j->from.regions;
   double *overlap = malloc((size_t)count * count * sizeof *overlap);
   unsigned char *suspect = malloc((size_t)count);
@@ -193,7 +235,7 @@ static ep_status drop_suspects(job *j, const trial *t, int *dropped, ep_error *e
   return status;
 }
 
-static ep_status match_and_drop(job *j, trial *t, ep_error *err) {
+static ep_status match_and_drop(job *j, ep_trial *t, ep_error *err) {
   EP_TRY(match_once(j, t, err));
   for (int round = 0; j->use && round < DROP_ROUNDS; round++) {
     int dropped = 0;
@@ -218,20 +260,21 @@ static ep_status functional_map(const job *j, ep_map *out, ep_error *err) {
   return status == EP_OK ? ep_polar(m, m, out->a, out->a, err) : status;
 }
 
-static ep_status finish(job *j, trial *t, ep_map *out, ep_error *err) {
+static ep_status finish(job *j, ep_trial *t, ep_map *out, ep_error *err) {
   const size_t square = (size_t)j->options->m * j->options->m;
   out->n = j->from.n;
   out->m = j->options->m;
-  out->p = t->p;
-  out->tet = t->tet;
-  out->weight = t->weight;
-  t->p = t->tet = NULL;
-  t->weight = NULL;
-  out->quality.settle_from = out->quality.settle_to = out->quality.settle_other = -1;
+  out->tet = malloc((size_t)out->n * sizeof *out->tet);
+  out->weight = malloc(4 * (size_t)out->n * sizeof *out->weight);
   out->quality.inverted = out->quality.inverted_left = -1;
   out->c = malloc(square * sizeof *out->c);
   out->a = malloc(square * sizeof *out->a);
-  if (!out->c || !out->a) return ep_fail(err, EP_ERR_MEMORY, "no memory for a map");
+  if (!out->c || !out->a || !out->tet || !out->weight)
+    return ep_fail(err, EP_ERR_MEMORY, "no memory for a map");
+  EP_TRY(make_finer(j, t, out->tet, out->weight, err));
+  out->p = t->p;
+  t->p = NULL;
+  EP_TRY(record_candidates(j, &out->quality, err));
   EP_TRY(functional_map(j, out, err));
   memcpy(out->rotation, t->r, sizeof t->r);
   out->scale = j->from.length / j->to.length;
@@ -280,6 +323,10 @@ static ep_status make_job(const ep_shape *from, const ep_shape *to, job *j, ep_e
   const int k = functions_in_use(from, to, o);
   EP_TRY(ep_side_make(from, k, &j->from, err));
   EP_TRY(ep_side_make(to, k, &j->to, err));
+  if (o->landmarks) {
+    EP_TRY(ep_side_landmarks(&j->from, o->landmarks, o->landmark, true, err));
+    EP_TRY(ep_side_landmarks(&j->to, o->landmarks, o->landmark, false, err));
+  }
   if (!o->regions) return EP_OK;
   EP_TRY(ep_side_regions(&j->from, o->regions, o->from_column, err));
   EP_TRY(ep_side_regions(&j->to, o->regions, o->to_column, err));
@@ -311,9 +358,9 @@ ep_status ep_map_match(const ep_shape *from, const ep_shape *to, const ep_map_op
   memset(out, 0, sizeof *out);
   EP_TRY(check_shapes(from, to, options, err));
   job j = {.options = options, .log = log};
-  trial t = {0};
+  ep_trial t = {0};
   ep_status status = make_job(from, to, &j, err);
-  if (status == EP_OK) status = make_trial(&j, &t, err);
+  if (status == EP_OK) status = ep_trial_make(&j.from, &j.to, &t, err);
   if (status == EP_OK) status = match_and_drop(&j, &t, err);
   if (status == EP_OK) status = finish(&j, &t, out, err);
   if (status == EP_OK) say(&j, out);
@@ -321,8 +368,9 @@ ep_status ep_map_match(const ep_shape *from, const ep_shape *to, const ep_map_op
     ep_map_free(out);
     ep_fail_context(err, "map %s <- %s", from->mesh->name, to->mesh->name);
   }
-  free_trial(&t);
+  ep_trial_free(&t);
   free(j.use);
+  ep_candidates_free(&j.candidates);
   ep_side_free(&j.from);
   ep_side_free(&j.to);
   return status;

@@ -8,17 +8,23 @@
 #include "align/private.h"
 #include "linalg/dense.h"
 
-enum { FIRST_FUNCTIONS = 3 };
+enum { FIRST_FUNCTIONS = 3, POLISH_ROUNDS = 4 };
+// Landmarks pull what is near: width over the rms radius; softness of meeting them.
+static const double PULL_WIDTH = 0.5, PULL_SOFT = 0.02;
 
 typedef struct matcher {
   const ep_side *from, *to;
   const ep_match_rule *rule;
-  int regions;       // that take part
-  double region_rms; // of those columns of `from`, over its volume
-  double *turned;    // (to->n x 3) to's positions in from's frame
-  double *smooth;    // (from->n x 3) from's positions moved by the kk-mode displacement
-  double *image;     // (from->n x max(k, 3)) values of `to` at p
+  int regions, columns; // regions that take part; these and the landmarks
+  double region_rms;    // of those columns of `from`, over its volume
+  double *turned;       // (to->n x 3) to's positions in from's frame
+  double *smooth;       // (from->n x 3) from's positions moved by the kk-mode displacement
+  double *image;        // (from->n x max(k, 3)) values of `to` at p
   double *query, *target, *lead, *c, *d;
+  double *pull, *gram, *marks; // landmarks: coefficients, their matrix, turned points of `to`
+  // While polishing: the points the map sends from's vertices to, in tets; NULL before
+  const int *tet;
+  const double *weight;
 } matcher;
 
 static void free_matcher(matcher *w) {
@@ -30,6 +36,9 @@ static void free_matcher(matcher *w) {
   free(w->lead);
   free(w->c);
   free(w->d);
+  free(w->pull);
+  free(w->gram);
+  free(w->marks);
 }
 
 static double root_mean_square(const ep_side *side, const unsigned char *use) {
@@ -57,7 +66,9 @@ static ep_status make_matcher(const ep_side *from, const ep_side *to, const doub
     for (int g = 0; g < from->regions; g++) w->regions += !rule->use || rule->use[g];
   if (w->regions) w->region_rms = root_mean_square(from, rule->use);
   const size_t nf = (size_t)from->n, nt = (size_t)to->n, k = (size_t)from->k;
-  const size_t wide = k > 3 ? k : 3, d = (size_t)rule->k + 3 + (size_t)w->regions;
+  w->columns = w->regions + (rule->mark_weight > 0 ? from->marks : 0);
+  const size_t wide = k > 3 ? k : 3, d = (size_t)rule->k + 3 + (size_t)w->columns;
+  const size_t marks = (size_t)from->marks;
   w->turned = malloc(3 * nt * sizeof(double));
   w->smooth = malloc(3 * nf * sizeof(double));
   w->image = malloc(wide * nf * sizeof(double));
@@ -66,13 +77,46 @@ static ep_status make_matcher(const ep_side *from, const ep_side *to, const doub
   w->lead = malloc((size_t)rule->k * nt * 2 * sizeof(double));
   w->c = malloc(2 * k * k * sizeof(double));
   w->d = malloc(3 * k * sizeof(double));
-  if (!w->turned || !w->smooth || !w->image || !w->query || !w->target || !w->lead || !w->c ||
-      !w->d) {
+  w->pull = malloc((3 * marks + 1) * sizeof(double));
+  w->gram = malloc((marks * marks + 1) * sizeof(double));
+  w->marks = malloc((3 * marks + 1) * sizeof(double));
+  if (!w->pull || !w->gram || !w->marks || !w->turned || !w->smooth || !w->image || !w->query ||
+      !w->target || !w->lead || !w->c || !w->d) {
     free_matcher(w);
     return ep_fail(err, EP_ERR_MEMORY, "no memory to match %d with %d vertices", from->n, to->n);
   }
   ep_frame_apply(to->n, r, to->x, w->turned);
   memcpy(w->smooth, from->x, 3 * nf * sizeof(double));
+  if (marks) ep_frame_apply(to->marks, r, to->mark_x, w->marks);
+  return EP_OK;
+}
+
+static double bump(const ep_side *side, const double *a, const double *b) {
+  const double s2 = PULL_WIDTH * PULL_WIDTH * side->radius * side->radius;
+  double d2 = 0;
+  for (int c = 0; c < 3; c++) d2 += (a[c] - b[c]) * (a[c] - b[c]);
+  return exp(-0.5 * d2 / s2);
+}
+
+// Move the displaced positions by a sum of Gaussians, so that landmarks come to their partners.
+static ep_status pull_to_marks(matcher *w, ep_error *err) {
+  const ep_side *from = w->from;
+  const int count = from->marks;
+  if (w->rule->mark_weight <= 0 || !count) return EP_OK;
+  for (int i = 0; i < count; i++) {
+    const double *x = from->mark_x + 3 * i;
+    const size_t near = 3 * (size_t)from->mark_near[i];
+    for (int j = 0; j < count; j++)
+      w->gram[i * count + j] = bump(from, x, from->mark_x + 3 * j) + (i == j ? PULL_SOFT : 0);
+    for (int c = 0; c < 3; c++)
+      w->pull[3 * i + c] = w->marks[3 * i + c] - x[c] - (w->smooth[near + c] - from->x[near + c]);
+  }
+  EP_TRY(ep_solve_spd(count, w->gram, 3, w->pull, err));
+  for (int v = 0; v < from->n; v++)
+    for (int i = 0; i < count; i++) {
+      const double g = bump(from, from->x + 3 * (size_t)v, from->mark_x + 3 * i);
+      for (int c = 0; c < 3; c++) w->smooth[3 * (size_t)v + c] += g * w->pull[3 * i + c];
+    }
   return EP_OK;
 }
 
@@ -88,14 +132,33 @@ ep_status ep_match_functional(const ep_side *from, const ep_side *to, const int 
   return EP_OK;
 }
 
+// image (from->n x width) = values (to->n x width) where the map sends from's vertices.
+static void pull(const matcher *w, const int *p, int width, const double *values, double *image) {
+  for (int i = 0; i < w->from->n; i++) {
+    double *out = image + (size_t)i * width;
+    if (!w->tet) {
+      memcpy(out, values + (size_t)p[i] * width, (size_t)width * sizeof *out);
+      continue;
+    }
+    const int *corner = w->to->shape->mesh->tet + 4 * (size_t)w->tet[i];
+    const double *b = w->weight + 4 * (size_t)i;
+    for (int c = 0; c < width; c++) {
+      double sum = 0;
+      for (int j = 0; j < 4; j++) sum += b[j] * values[(size_t)corner[j] * width + c];
+      out[c] = sum;
+    }
+  }
+}
+
 // y = x + Pi (x_e[p] - x), Pi the projection on the constant and the first kk functions.
 static void smooth_positions(matcher *w, int kk, const int *p) {
   const ep_side *from = w->from;
   const int k = from->k;
   double mean[3] = {0};
+  pull(w, p, 3, w->turned, w->image);
   for (int i = 0; i < from->n; i++)
     for (int c = 0; c < 3; c++) {
-      const double d = w->turned[3 * (size_t)p[i] + c] - from->x[3 * (size_t)i + c];
+      const double d = w->image[3 * (size_t)i + c] - from->x[3 * (size_t)i + c];
       w->image[3 * (size_t)i + c] = d;
       mean[c] += from->share[i] * d;
     }
@@ -110,8 +173,7 @@ static void smooth_positions(matcher *w, int kk, const int *p) {
 // w->lead (to->n x kk) = Phi_to C^T with the leading kk x kk block of C.
 static void functions_of_target(matcher *w, int kk, const int *p) {
   const int k = w->from->k, n = w->to->n;
-  for (int i = 0; i < w->from->n; i++)
-    memcpy(w->image + (size_t)i * k, w->to->phi + (size_t)p[i] * k, (size_t)k * sizeof(double));
+  pull(w, p, k, w->to->phi, w->image);
   ep_gemm_tn(k, k, w->from->n, w->from->mphi, w->image, w->c);
   double *block = w->c + (size_t)k * k, *first = w->lead + (size_t)n * kk;
   for (int a = 0; a < kk; a++) memcpy(block + a * kk, w->c + a * k, (size_t)kk * sizeof(double));
@@ -125,13 +187,15 @@ static void fill(const matcher *w, const ep_side *side, const double *phi, int s
   const double level = sqrt(kk > 0 ? (double)kk : 1);
   const double a = w->rule->gamma * level / w->from->radius;
   const double b = w->regions ? w->rule->region_weight * level / w->region_rms : 0;
+  const double e = side->marks ? w->rule->mark_weight * level / sqrt(side->marks) : 0;
   for (int i = 0; i < side->n; i++) {
     for (int f = 0; f < kk; f++) *out++ = phi[(size_t)i * stride + f];
     for (int c = 0; c < 3; c++) *out++ = a * x[3 * (size_t)i + c];
-    if (!w->regions) continue;
-    for (int g = 0; g < side->regions; g++)
+    for (int g = 0; g < side->regions && w->regions; g++)
       if (!w->rule->use || w->rule->use[g])
         *out++ = b * side->region[(size_t)i * side->regions + g];
+    for (int m = 0; m < w->columns - w->regions; m++)
+      *out++ = e * side->mark[(size_t)i * side->marks + m];
   }
 }
 
@@ -140,12 +204,27 @@ static ep_status match_level(matcher *w, int kk, int *p, ep_error *err) {
     functions_of_target(w, kk, p);
     smooth_positions(w, kk, p);
   }
+  EP_TRY(pull_to_marks(w, err));
   fill(w, w->from, w->from->phi, w->from->k, kk, w->smooth, w->query);
   fill(w, w->to, w->lead, kk, kk, w->turned, w->target);
   ep_tree *tree;
-  EP_TRY(ep_tree_make(w->to->n, kk + 3 + w->regions, w->target, &tree, err));
+  EP_TRY(ep_tree_make(w->to->n, kk + 3 + w->columns, w->target, &tree, err));
   ep_tree_nearest(tree, w->from->n, w->query, p);
   ep_tree_free(tree);
+  return EP_OK;
+}
+
+// Rounds at the last level with points in tets: without the noise of vertices.
+static ep_status polish(matcher *w, int *p, int *tet, double *weight, ep_error *err) {
+  const int d = w->rule->k + 3 + w->columns;
+  const ep_mesh *mesh = w->to->shape->mesh;
+  EP_TRY(ep_points_project(mesh, d, w->target, w->from->n, w->query, p, tet, weight, err));
+  w->tet = tet;
+  w->weight = weight;
+  for (int round = 0; round < POLISH_ROUNDS; round++) {
+    EP_TRY(match_level(w, w->rule->k, p, err));
+    EP_TRY(ep_points_project(mesh, d, w->target, w->from->n, w->query, p, tet, weight, err));
+  }
   return EP_OK;
 }
 
@@ -157,13 +236,15 @@ ep_status ep_match_levels(const ep_side *from, const ep_side *to, const double r
                    from->k, to->k);
   matcher w;
   EP_TRY(make_matcher(from, to, r, rule, &w, err));
-  for (int i = 0; i < from->n; i++) p[i] = -1;
-  ep_status status = match_level(&w, 0, p, err);
-  const int first = rule->k < FIRST_FUNCTIONS ? rule->k : FIRST_FUNCTIONS;
+  ep_status status = EP_OK;
+  if (!rule->refine) {
+    for (int i = 0; i < from->n; i++) p[i] = -1;
+    status = match_level(&w, 0, p, err);
+  }
+  int first = rule->k < FIRST_FUNCTIONS ? rule->k : FIRST_FUNCTIONS;
+  if (rule->refine) first = rule->k;
   for (int kk = first; kk <= rule->k && status == EP_OK; kk++) status = match_level(&w, kk, p, err);
-  if (status == EP_OK && tet)
-    status = ep_points_project(to->shape->mesh, rule->k + 3 + w.regions, w.target, from->n, w.query,
-                               p, tet, weight, err);
+  if (status == EP_OK && tet) status = polish(&w, p, tet, weight, err);
   free_matcher(&w);
   return status;
 }

@@ -40,18 +40,32 @@ typedef struct ep_side {
   int regions;
   double *indicator; // (n x regions) 0 or 1
   double *region;    // (n x regions) smoothed
+  int marks;
+  double *mark;   // (n x marks) smooth bump around each landmark, mean square 1
+  double *mark_x; // (marks x 3) landmarks, like x
+  int *mark_near; // (marks) vertex nearest to each
 } ep_side;
 
 ep_status ep_side_make(const ep_shape *shape, int k, ep_side *out, ep_error *err);
 // Indicators of the regions' column and their smoothed form (M + t K) s = M 1_R.
 ep_status ep_side_regions(ep_side *side, const ep_regions *regions, int column, ep_error *err);
+// f (n x columns) replaced by (M + t K)^-1 M f, t = (width V^(1/3))^2.
+ep_status ep_side_blur(const ep_side *side, double width, int columns, double *f, ep_error *err);
+// Errors: EP_ERR_ARGUMENT for a vertex out of range, a point outside the mesh.
+ep_status ep_side_landmarks(ep_side *side, int count, const ep_landmark *marks, bool is_from,
+                            ep_error *err);
+// The side on `count` of its vertices: sample (count), owner (n) the sample nearest to each vertex.
+// No stiffness: such a side can be matched, not judged.
+ep_status ep_side_coarsen(const ep_side *side, int count, ep_side *out, int *sample, int *owner,
+                          ep_error *err);
 void ep_side_free(ep_side *side);
 // Number of connected components of a mesh, or -1 without memory.
 int ep_components(const ep_mesh *mesh);
 
 // ---- frame.c
 void ep_frame_identity(double r[9]);
-double ep_frame_angle(const double r[9]);                                    // degrees
+double ep_frame_angle(const double r[9]); // degrees
+double ep_frame_determinant(const double r[9]);
 void ep_frame_multiply(const double a[9], const double b[9], double out[9]); // may alias
 void ep_frame_transpose(const double a[9], double out[9]);
 // y (n x 3) = R x, row by row.
@@ -60,21 +74,26 @@ void ep_frame_apply(int n, const double r[9], const double *x, double *y);
 // weights: files hold wrong regions). *found = false, R = identity: fewer than four, or not spread.
 ep_status ep_frame_from_regions(const ep_side *from, const ep_side *to, const unsigned char *use,
                                 double r[9], bool *found, ep_error *err);
-// Rotation taking `to` to `from` from a map p, weighted by volume.
-ep_status ep_frame_from_map(const ep_side *from, const ep_side *to, const int *p, double r[9],
-                            ep_error *err);
+// Rotation (mirrored: times -1) taking `to` to `from` from a map p, weighted by volume.
+ep_status ep_frame_from_map(const ep_side *from, const ep_side *to, const int *p, bool mirrored,
+                            double r[9], ep_error *err);
 // Of the four proper matches of principal axes the one nearest the authored frame.
 ep_status ep_frame_from_axes(const ep_side *from, const ep_side *to, double r[9], ep_error *err);
+// Principal axes as rows of a proper rotation, longest last, and the variances along them.
+ep_status ep_frame_axes(const ep_side *side, double v[9], double variance[3], ep_error *err);
 
 // ---- match.c: product-space matching in a given frame.
 typedef struct ep_match_rule {
   int k;                    // functions raised up to
   double gamma;             // weight of positions
   double region_weight;     // weight of regions, 0 without
+  double mark_weight;       // weight of landmarks, 0 without
+  bool refine;              // p is a map already: the last level only
   const unsigned char *use; // (regions) which take part, NULL: all
 } ep_match_rule;
 
-// p (from->n): the map in frame r; tet (n), weight (n x 4): the finer map, both or neither NULL.
+// p (from->n): the map in frame r; tet (n), weight (n x 4): the finer map, both or neither NULL,
+// only on sides with all their vertices.
 // Errors: memory.
 ep_status ep_match_levels(const ep_side *from, const ep_side *to, const double r[9],
                           const ep_match_rule *rule, int *p, int *tet, double *weight,
@@ -87,6 +106,33 @@ ep_status ep_match_functional(const ep_side *from, const ep_side *to, const int 
                               ep_error *err);
 // Round trip from -> to -> from: rms over the rms radius.
 double ep_match_cycle(const ep_side *from, const int *p, const int *back);
+
+// ---- trial.c: a map there and back from one start frame.
+typedef struct ep_trial {
+  double r[9], cycle;
+  int rounds;
+  bool plain; // nearest neighbours in space
+  int *p, *back;
+} ep_trial;
+ep_status ep_trial_make(const ep_side *from, const ep_side *to, ep_trial *t, ep_error *err);
+void ep_trial_free(ep_trial *t);
+// Match in frame t->r, turn the frame to what the map says, match again, at most `rounds` times;
+// then the way back.
+ep_status ep_trial_run(const ep_side *from, const ep_side *to, const ep_match_rule *rule,
+                       int rounds, ep_trial *t, ep_error *err);
+double ep_frame_between(const double a[9], const double b[9]); // degrees; 180 where one is mirrored
+
+// ---- candidates.c: frames tried on coarse sides.
+enum { EP_CANDIDATES_MAX = 40 };
+typedef struct ep_candidates {
+  int count, chosen, preferred, rivals;
+  int settle_from, settle_to, settle_other; // samples, -1 where the choice is clear
+  ep_frame_candidate frame[EP_CANDIDATES_MAX];
+  int *p[EP_CANDIDATES_MAX]; // (from->n) the map found in each frame
+} ep_candidates;
+ep_status ep_candidates_try(const ep_side *from, const ep_side *to, const ep_match_rule *rule,
+                            const ep_map_options *o, ep_candidates *c, ep_error *err);
+void ep_candidates_free(ep_candidates *c);
 
 // ---- couple.c: the objective and its Euclidean gradient (tests compare with differences).
 typedef struct ep_couple_problem {

@@ -326,6 +326,30 @@ static void weigh(ep_map_quality *q, const char *what, double value, double doub
            used ? "; " : "", what, value, high ? "at most" : "at least", doubtful, advice);
 }
 
+// More than one frame fits: name them, and the landmark that tells them apart.
+static void weigh_rivals(ep_map_quality *q) {
+  if (!q->rivals) return;
+  if (q->verdict == EP_MAP_GOOD) q->verdict = EP_MAP_DOUBTFUL;
+  char *end = q->reasons + sizeof q->reasons, *at = q->reasons + strlen(q->reasons);
+  const char *chosen = "";
+  for (int i = 0; i < q->candidates; i++)
+    if (q->candidate[i].chosen) chosen = q->candidate[i].name;
+  at += snprintf(at, (size_t)(end - at), "%sframe '%s' was chosen, but",
+                 at > q->reasons ? "; " : "", chosen);
+  int named = 0;
+  for (int i = 0; i < q->candidates && at < end - 64; i++)
+    if (q->candidate[i].rival && named++ < 3)
+      at += snprintf(at, (size_t)(end - at), "%s '%s'", named > 1 ? "," : "", q->candidate[i].name);
+  if (at < end && q->rivals > 3)
+    at += snprintf(at, (size_t)(end - at), " and %d more", q->rivals - 3);
+  if (at < end)
+    snprintf(at, (size_t)(end - at),
+             " fit%s as well: nothing tells them apart. Give a landmark for vertex %d "
+             "(counted from 0), which goes to vertex %d here and to %d otherwise, or say that the "
+             "authored frame is right",
+             q->rivals > 1 ? "" : "s", q->settle_from, q->settle_to, q->settle_other);
+}
+
 static void weigh_inverted(ep_map_quality *q) {
   if (q->inverted_left <= 0) return;
   const size_t used = strlen(q->reasons);
@@ -349,10 +373,11 @@ void ep_map_verdict(bool same_family, ep_map *map) {
   const char *give = q->regions ? "check the regions, give more" : "give regions";
   if (q->cycle >= 0) weigh(q, "round trip", q->cycle, CYCLE_DOUBTFUL, CYCLE_BAD, true, give);
   weigh(q, "covered share", q->coverage, COVERAGE_DOUBTFUL, COVERAGE_BAD, false, give);
-  if (!q->regions)
+  if (!q->regions && !q->landmarks && same_family)
     weigh(q, "turn of the frame in degrees", q->frame_angle,
           same_family ? FRAME_DOUBTFUL_FAMILY : FRAME_DOUBTFUL, HUGE_VAL, true,
           "turn the example as the object stands, or give regions");
+  weigh_rivals(q);
   double jaccard = 0;
   int used = 0;
   for (int g = 0; g < q->regions; g++) {

@@ -16,6 +16,9 @@ void ep_side_free(ep_side *side) {
   free(side->share);
   free(side->indicator);
   free(side->region);
+  free(side->mark);
+  free(side->mark_x);
+  free(side->mark_near);
   ep_csr_free(&side->stiffness);
   memset(side, 0, sizeof *side);
 }
@@ -157,27 +160,30 @@ static void blur_solve(const ep_side *side, double t, int width, const double *b
   }
 }
 
+ep_status ep_side_blur(const ep_side *side, double width, int columns, double *f, ep_error *err) {
+  const size_t all = (size_t)side->n * columns;
+  const double t = width * width * side->length * side->length;
+  double *buffer = malloc((6 * all + 4 * (size_t)columns) * sizeof *buffer);
+  if (!buffer) return no_memory(side, err);
+  double *b = buffer + 5 * all + 4 * (size_t)columns;
+  ep_csr_multiply(side->shape->mass, columns, f, b);
+  blur_solve(side, t, columns, b, f, buffer);
+  free(buffer);
+  return EP_OK;
+}
+
 ep_status ep_side_regions(ep_side *side, const ep_regions *regions, int column, ep_error *err) {
   const int count = regions->count;
   const size_t all = (size_t)side->n * count;
-  const double t = REGION_BLUR * REGION_BLUR * side->length * side->length;
   side->indicator = calloc(all, sizeof(double));
   side->region = calloc(all, sizeof(double));
-  double *buffer = malloc((6 * all + 4 * (size_t)count) * sizeof(double));
-  if (!side->indicator || !side->region || !buffer) {
-    free(buffer);
-    return no_memory(side, err);
-  }
+  if (!side->indicator || !side->region) return no_memory(side, err);
   for (int g = 0; g < count; g++) {
     const int at = g * regions->shapes + column;
     for (int i = regions->start[at]; i < regions->start[at + 1]; i++)
       side->indicator[(size_t)regions->vertex[i] * count + g] = 1;
   }
   side->regions = count;
-  double *b = buffer + 5 * all + 4 * (size_t)count;
-  ep_csr_multiply(side->shape->mass, count, side->indicator, b);
   memcpy(side->region, side->indicator, all * sizeof(double));
-  blur_solve(side, t, count, b, side->region, buffer);
-  free(buffer);
-  return EP_OK;
+  return ep_side_blur(side, REGION_BLUR, count, side->region, err);
 }
