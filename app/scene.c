@@ -277,6 +277,7 @@ static ep_status read_rest(const reader *r, const raw_scene *raw, ep_scene *out)
   const raw_examples no_examples = {0};
   const raw_examples *examples = raw->examples ? raw->examples : &no_examples;
   EP_TRY(number(r, "examples.strength", examples->strength, 1, 0, 1e4, &out->strength));
+  EP_TRY(number(r, "examples.relief", examples->relief, 0, 0, 1, &out->relief));
   out->force = examples->force ? (ep_example_force)*examples->force : EP_EXAMPLE_ENERGY;
   out->solver = examples->solver ? (ep_solver)*examples->solver : EP_SOLVER_NLOPT;
   EP_TRY(read_path(r, examples, out));

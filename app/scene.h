@@ -57,7 +57,7 @@ typedef struct ep_scene {
   double dt;
   int steps;
   double damping_mass, damping_stiffness;
-  double strength;
+  double strength, relief;
   ep_example_force force;
   ep_solver solver;
   int methods;    // EP_METHOD bits

@@ -116,6 +116,7 @@ static const cyaml_schema_field_t constraints_fields[] = {
 };
 static const cyaml_schema_field_t examples_fields[] = {
     NUMBER(raw_examples, strength),
+    NUMBER(raw_examples, relief),
     NUMBER(raw_examples, alpha),
     CYAML_FIELD_ENUM_PTR("path", OPTIONAL | CYAML_FLAG_STRICT, raw_examples, path, path_names,
                          CYAML_ARRAY_LEN(path_names)),

@@ -52,7 +52,7 @@ typedef struct raw_constraints {
   double *sum_to_one, *non_negative;
 } raw_constraints;
 typedef struct raw_examples {
-  double *strength, *alpha;
+  double *strength, *relief, *alpha;
   int *force, *solver, *path;
   raw_constraints *constraints;
 } raw_examples;

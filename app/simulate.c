@@ -201,6 +201,7 @@ static void set_up_step(simulation *s, ep_nlopt_target *nlopt) {
   s->def.force = s->force;
   s->def.damping_mass = scene->damping_mass;
   s->def.damping_stiffness = scene->damping_stiffness;
+  s->def.relief = scene->relief;
   s->def.strength = s->model->size.k && (scene->methods & EP_METHOD_LB) ? scene->strength : 0;
   s->def.green = scene->green;
   s->def.example_force = scene->force;
