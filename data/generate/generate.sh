@@ -35,6 +35,8 @@ cp "$work/plane.msh" "$meshes/plane.msh"
 pose none 0 "$work/plane.msh" "$work/check.veg"
 
 pose s-bend 65 "$work/bar.msh" bar-s.veg
+pose twist-left 70 "$work/bar.msh" bar-left.veg
+pose bend-right 45 "$work/bar.msh" bar-right.veg
 pose none 0 "$work/cylinder.msh" cylinder.veg
 pose twist 150 "$work/cylinder.msh" cylinder-twist.veg
 pose s-bend 65 "$work/coarse.msh" cylinder-s.veg

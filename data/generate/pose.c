@@ -1,7 +1,7 @@
 // Makes the deformed example meshes of data/: reads a Gmsh 2.2 ASCII mesh, bends it by a formula,
 // writes a .veg file with the same connectivity, and prints the quality of what it wrote.
 //
-//   pose none|twist|s-bend|raise DEGREES IN.msh OUT.veg
+//   pose none|twist|s-bend|raise|twist-left|bend-right DEGREES IN.msh OUT.veg
 //
 // It stands alone (cc pose.c -lm), so that the data can be made before anything else is built.
 #include <math.h>
@@ -119,6 +119,28 @@ static void raise_wings(double *x, double degrees) {
   x[1] = up + cos(a) * y;
 }
 
+// The part x < -0.06 twists about the axis, full angle at the end x = -0.5.
+static void twist_left(double *x, double degrees) {
+  const double a = degrees * pi / 180 * smooth((-x[0] - 0.06) / 0.44), y = x[1], z = x[2];
+  x[1] = cos(a) * y - sin(a) * z;
+  x[2] = sin(a) * y + cos(a) * z;
+}
+
+// Slope of the bent right end: level at x = 0.06, full from half of the rest on.
+static double end_angle(double s, double degrees) {
+  return degrees * pi / 180 * smooth(s / 0.22);
+}
+
+static void bend_right(double *x, double degrees) {
+  const double s = x[0] - 0.06, y = x[1];
+  if (s <= 0) return;
+  double along, up;
+  const double a = end_angle(s, degrees);
+  centre_line(end_angle, degrees, s, &along, &up);
+  x[0] = 0.06 + along - sin(a) * y;
+  x[1] = up + cos(a) * y;
+}
+
 static double dot(const double *a, const double *b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -179,11 +201,14 @@ static void write_veg(const tets *mesh, const char *path) {
 }
 
 int main(int argc, char **argv) {
-  if (argc != 5) die("usage: pose none|twist|s-bend|raise DEGREES IN.msh OUT.veg", "arguments");
+  if (argc != 5)
+    die("usage: pose none|twist|s-bend|raise|twist-left|bend-right DEGREES IN.msh OUT.veg",
+        "arguments");
   static const struct {
     const char *name;
     void (*deform)(double *x, double degrees);
-  } kinds[] = {{"none", NULL}, {"twist", twist}, {"s-bend", s_bend}, {"raise", raise_wings}};
+  } kinds[] = {{"none", NULL},         {"twist", twist},           {"s-bend", s_bend},
+               {"raise", raise_wings}, {"twist-left", twist_left}, {"bend-right", bend_right}};
   const size_t count = sizeof kinds / sizeof kinds[0];
   size_t kind = 0;
   while (kind < count && strcmp(argv[1], kinds[kind].name) != 0) kind++;
