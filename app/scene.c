@@ -207,6 +207,7 @@ static ep_status read_reduction(const reader *r, const raw_reduction *given, ep_
 static ep_status read_simulation(const reader *r, const raw_simulation *given, ep_scene *out) {
   const raw_simulation none = {0}, *raw = given ? given : &none;
   const raw_damping undamped = {0}, *damping = raw->damping ? raw->damping : &undamped;
+  out->integrator = raw->integrator ? (ep_integrator)*raw->integrator : EP_IMPLICIT_EULER;
   EP_TRY(number(r, "simulation.dt", raw->dt, 1.0 / 60, 1e-6, 1, &out->dt));
   EP_TRY(whole(r, "simulation.steps", raw->steps, 120, 1, 1000000, &out->steps));
   EP_TRY(number(r, "simulation.damping.mass", damping->mass, 0.1, 0, 1e6, &out->damping_mass));
@@ -273,6 +274,14 @@ static ep_status read_path(const reader *r, const raw_examples *raw, ep_scene *o
                 &out->green.non_negative);
 }
 
+// A local gradient-based algorithm of NLopt by name; whether NLopt has it shows when it is made.
+static ep_status algorithm(const reader *r, const char *key, const char *name, char out[48]) {
+  if (strncmp(name, "LD_", 3) != 0 || strlen(name) > 47)
+    return bad(r, key, "'%.60s' is no local algorithm with gradients; use one as LD_LBFGS", name);
+  snprintf(out, 48, "%s", name);
+  return EP_OK;
+}
+
 static ep_status read_rest(const reader *r, const raw_scene *raw, ep_scene *out) {
   const raw_examples no_examples = {0};
   const raw_examples *examples = raw->examples ? raw->examples : &no_examples;
@@ -281,6 +290,8 @@ static ep_status read_rest(const reader *r, const raw_scene *raw, ep_scene *out)
   out->force = examples->force ? (ep_example_force)*examples->force : EP_EXAMPLE_ENERGY;
   out->solver = examples->solver ? (ep_solver)*examples->solver : EP_SOLVER_NLOPT;
   EP_TRY(read_path(r, examples, out));
+  EP_TRY(algorithm(r, "examples.algorithm", examples->algorithm ? examples->algorithm : "LD_LBFGS",
+                   out->algorithm));
   const raw_output *output = raw->output;
   EP_TRY(whole(r, "output.every", output ? output->every : NULL, 2, 1, 1000000, &out->every));
   out->formats = EP_FORMAT_VTU | EP_FORMAT_GLB | EP_FORMAT_PNG;
@@ -290,6 +301,114 @@ static ep_status read_rest(const reader *r, const raw_scene *raw, ep_scene *out)
       out->formats |= (unsigned)output->formats[i];
   }
   return EP_OK;
+}
+
+const char *ep_method_name(ep_method method) {
+  static const char *const names[EP_METHODS] = {"cubature", "cubic", "all", "full"};
+  return (int)method >= 0 && method < EP_METHODS ? names[method] : NULL;
+}
+
+// Whole numbers of a list, ascending, each once.
+static ep_status wholes(const reader *r, const char *key, unsigned given, const double *value,
+                        int low, int high, int *count, int *out) {
+  *count = 0;
+  for (unsigned i = 0; i < given; i++) {
+    int next = 0, at = 0;
+    EP_TRY(whole(r, key, &value[i], 0, low, high, &next));
+    while (at < *count && out[at] < next) at++;
+    if (at < *count && out[at] == next) continue;
+    memmove(out + at + 1, out + at, (size_t)(*count - at) * sizeof *out);
+    out[at] = next;
+    ++*count;
+  }
+  return EP_OK;
+}
+
+// Time steps, descending; each must go into the longest, so that all runs meet at the same times.
+static ep_status time_steps(const reader *r, const raw_compare *raw, const ep_scene *scene,
+                            ep_sweep *out) {
+  const double *list = raw->dt_count ? raw->dt : &scene->dt;
+  out->ndt = 0;
+  for (unsigned i = 0; i < (raw->dt_count ? raw->dt_count : 1); i++) {
+    double next = 0;
+    int at = 0;
+    EP_TRY(number(r, "compare.dt", &list[i], 0, 1e-6, 1, &next));
+    while (at < out->ndt && out->dt[at] > next) at++;
+    if (at < out->ndt && out->dt[at] == next) continue;
+    memmove(out->dt + at + 1, out->dt + at, (size_t)(out->ndt - at) * sizeof *out->dt);
+    out->dt[at] = next;
+    out->ndt++;
+  }
+  for (int i = 1; i < out->ndt; i++) {
+    const double ratio = out->dt[0] / out->dt[i];
+    if (fabs(ratio - round(ratio)) > 1e-6)
+      return bad(r, "compare.dt", "%g s does not go into %g s a whole number of times", out->dt[i],
+                 out->dt[0]);
+  }
+  return EP_OK;
+}
+
+static ep_status budget(const reader *r, const char *text, ep_sweep *out) {
+  while (text && *text) {
+    char *end;
+    const double value = strtod(text, &end);
+    while (*end == ' ') end++;
+    const size_t length = strcspn(end, ", ");
+    const bool sound = end != text && isfinite(value) && value > 0;
+    if (sound && length == 2 && strncmp(end, "ms", 2) == 0)
+      out->budget_seconds = 1e-3 * value;
+    else if (sound && length == 2 && strncmp(end, "us", 2) == 0)
+      out->budget_seconds = 1e-6 * value;
+    else if (sound && length == 1 && *end == '%')
+      out->budget_error = 1e-2 * value;
+    else
+      return bad(r, "compare.budget", "'%.40s': use a time or an error, as 2 ms, 500 us or 1 %%",
+                 text);
+    text = end + length + strspn(end + length, ", ");
+  }
+  return EP_OK;
+}
+
+static ep_status solvers(const reader *r, const raw_compare *raw, const ep_scene *scene,
+                         ep_sweep *out) {
+  out->nsolvers = 1;
+  snprintf(out->solver[0], sizeof out->solver[0], "%s",
+           scene->solver == EP_SOLVER_NEWTON ? "newton" : scene->algorithm);
+  for (unsigned i = 0; i < raw->solvers_count; i++) {
+    out->nsolvers = (int)i + 1;
+    if (strcmp(raw->solvers[i], "newton") == 0)
+      strcpy(out->solver[i], "newton");
+    else
+      EP_TRY(algorithm(r, "compare.solvers", raw->solvers[i], out->solver[i]));
+  }
+  return EP_OK;
+}
+
+// Defaults: r and s of the scene and about half and double of them, all methods, its own material.
+static ep_status read_sweep(const reader *r, const raw_compare *given, ep_scene *out) {
+  const raw_compare none = {0}, *raw = given ? given : &none;
+  ep_sweep *sweep = &out->sweep;
+  const int examples = ep_scene_examples(out), low = examples > 4 ? examples : 4;
+  const double modes[3] = {fmax(low, out->modes / 2), out->modes, fmin(200, 2 * out->modes)};
+  const double elements[3] = {fmax(1, out->elements / 2), out->elements, 2 * out->elements};
+  EP_TRY(wholes(r, "compare.modes", raw->modes_count ? raw->modes_count : 3,
+                raw->modes_count ? raw->modes : modes, examples > 1 ? examples : 1, 200,
+                &sweep->nmodes, sweep->modes));
+  EP_TRY(wholes(r, "compare.elements", raw->elements_count ? raw->elements_count : 3,
+                raw->elements_count ? raw->elements : elements, 1, 20000, &sweep->nelements,
+                sweep->elements));
+  sweep->nmethods = raw->methods_count ? (int)raw->methods_count : EP_METHODS;
+  for (int i = 0; i < sweep->nmethods; i++)
+    sweep->method[i] = raw->methods_count ? (ep_method)raw->methods[i] : (ep_method)i;
+  sweep->nmaterials = raw->materials_count ? (int)raw->materials_count : 1;
+  for (int i = 0; i < sweep->nmaterials; i++)
+    sweep->material[i] = raw->materials_count ? (ep_material)raw->materials[i] : out->model;
+  sweep->reference = raw->reference ? (ep_method)*raw->reference : EP_METHOD_FULL;
+  if (sweep->reference != EP_METHOD_FULL && sweep->reference != EP_METHOD_ALL)
+    return bad(r, "compare.reference", "use full (the full space) or all (all elements)");
+  EP_TRY(solvers(r, raw, out, sweep));
+  EP_TRY(time_steps(r, raw, out, sweep));
+  return budget(r, raw->budget, sweep);
 }
 
 static ep_status convert(const reader *r, const raw_scene *raw, ep_scene *out) {
@@ -310,7 +429,8 @@ static ep_status convert(const reader *r, const raw_scene *raw, ep_scene *out) {
   EP_TRY(read_reduction(r, raw->reduction, out));
   EP_TRY(read_simulation(r, raw->simulation, out));
   EP_TRY(read_loads(r, raw, out));
-  return read_rest(r, raw, out);
+  EP_TRY(read_rest(r, raw, out));
+  return read_sweep(r, raw->compare, out);
 }
 
 ep_status ep_scene_parse(const char *path, const char *folder, const char *text, size_t size,

@@ -41,6 +41,28 @@ typedef struct ep_load {
   double from, until, ramp; // [s]
 } ep_load;
 
+// What `eigenpose compare` sweeps (docs/scene.md).
+typedef enum ep_method {
+  EP_METHOD_CUBATURE, // reduced, s trained elements
+  EP_METHOD_CUBIC,    // reduced, exact polynomials (StVK)
+  EP_METHOD_ALL,      // reduced, all elements
+  EP_METHOD_FULL,     // full space
+  EP_METHODS
+} ep_method;
+const char *ep_method_name(ep_method method); // "cubature", "cubic", "all", "full"
+
+enum { EP_LIST_MAX = 16 };
+typedef struct ep_sweep {
+  int nmodes, modes[EP_LIST_MAX], nelements, elements[EP_LIST_MAX];
+  int nmethods, nmaterials, nsolvers, ndt;
+  ep_method method[EP_METHODS];
+  ep_material material[EP_MATERIALS];
+  char solver[EP_LIST_MAX][48];        // "newton" or NLopt's name of an algorithm
+  double dt[EP_LIST_MAX];              // [s] descending
+  ep_method reference;                 // EP_METHOD_FULL or EP_METHOD_ALL
+  double budget_seconds, budget_error; // 0: none
+} ep_sweep;
+
 typedef struct ep_scene {
   char *path, *name;
   uint64_t seed;
@@ -54,18 +76,21 @@ typedef struct ep_scene {
   ep_family *family;
   int eigenfunctions, modes, linear_modes, path_samples, elements, training_poses;
   double amplitude;
+  ep_integrator integrator;
   double dt;
   int steps;
   double damping_mass, damping_stiffness;
   double strength, relief;
   ep_example_force force;
   ep_solver solver;
-  int methods;    // EP_METHOD bits
-  ep_green green; // alpha 0 without EP_METHOD_GREEN
+  int methods;        // EP_METHOD bits
+  ep_green green;     // alpha 0 without EP_METHOD_GREEN
+  char algorithm[48]; // NLopt's name of it
   int nloads;
   ep_load *load;
   int every;
   unsigned formats;
+  ep_sweep sweep;
 } ep_scene;
 
 // Read and check a scene; sets (nsets) are "key=value" overrides, checked like the file itself.

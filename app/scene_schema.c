@@ -35,6 +35,17 @@ static const cyaml_strval_t path_names[] = {
     {"green", EP_METHOD_GREEN},
     {"both", EP_METHOD_LB | EP_METHOD_GREEN},
 };
+static const cyaml_strval_t integrator_names[] = {
+    {"implicit-euler", EP_IMPLICIT_EULER},
+    {"newmark", EP_NEWMARK},
+    {"bdf2", EP_BDF2},
+};
+static const cyaml_strval_t method_names[] = {
+    {"cubature", EP_METHOD_CUBATURE},
+    {"cubic", EP_METHOD_CUBIC},
+    {"all", EP_METHOD_ALL},
+    {"full", EP_METHOD_FULL},
+};
 static const cyaml_strval_t format_names[] = {
     {"vtu", EP_FORMAT_VTU},
     {"glb", EP_FORMAT_GLB},
@@ -103,6 +114,8 @@ static const cyaml_schema_field_t damping_fields[] = {
     CYAML_FIELD_END,
 };
 static const cyaml_schema_field_t simulation_fields[] = {
+    CYAML_FIELD_ENUM_PTR("integrator", OPTIONAL | CYAML_FLAG_STRICT, raw_simulation, integrator,
+                         integrator_names, CYAML_ARRAY_LEN(integrator_names)),
     NUMBER(raw_simulation, dt),
     NUMBER(raw_simulation, steps),
     PART(raw_simulation, damping, damping_fields),
@@ -125,6 +138,7 @@ static const cyaml_schema_field_t examples_fields[] = {
                          CYAML_ARRAY_LEN(force_names)),
     CYAML_FIELD_ENUM_PTR("solver", OPTIONAL | CYAML_FLAG_STRICT, raw_examples, solver, solver_names,
                          CYAML_ARRAY_LEN(solver_names)),
+    TEXT(raw_examples, algorithm),
     CYAML_FIELD_END,
 };
 
@@ -154,6 +168,24 @@ static const cyaml_schema_field_t output_fields[] = {
     CYAML_FIELD_END,
 };
 
+static const cyaml_schema_value_t method = {
+    CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, method_names, CYAML_ARRAY_LEN(method_names))};
+static const cyaml_schema_value_t material_name = {
+    CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, material_names, CYAML_ARRAY_LEN(material_names))};
+static const cyaml_schema_field_t compare_fields[] = {
+    CYAML_FIELD_SEQUENCE("modes", OPTIONAL, raw_compare, modes, &number, 1, EP_LIST_MAX),
+    CYAML_FIELD_SEQUENCE("elements", OPTIONAL, raw_compare, elements, &number, 1, EP_LIST_MAX),
+    CYAML_FIELD_SEQUENCE("methods", OPTIONAL, raw_compare, methods, &method, 1, EP_METHODS),
+    CYAML_FIELD_SEQUENCE("materials", OPTIONAL, raw_compare, materials, &material_name, 1,
+                         EP_MATERIALS),
+    CYAML_FIELD_SEQUENCE("solvers", OPTIONAL, raw_compare, solvers, &text, 1, EP_LIST_MAX),
+    CYAML_FIELD_SEQUENCE("dt", OPTIONAL, raw_compare, dt, &number, 1, EP_LIST_MAX),
+    CYAML_FIELD_ENUM_PTR("reference", OPTIONAL | CYAML_FLAG_STRICT, raw_compare, reference,
+                         method_names, CYAML_ARRAY_LEN(method_names)),
+    TEXT(raw_compare, budget),
+    CYAML_FIELD_END,
+};
+
 static const cyaml_schema_field_t scene_fields[] = {
     CYAML_FIELD_FLOAT("schema", CYAML_FLAG_DEFAULT, raw_scene, schema),
     TEXT(raw_scene, name),
@@ -166,6 +198,7 @@ static const cyaml_schema_field_t scene_fields[] = {
     PART(raw_scene, examples, examples_fields),
     CYAML_FIELD_SEQUENCE("loads", OPTIONAL, raw_scene, loads, &load, 0, 256),
     PART(raw_scene, output, output_fields),
+    PART(raw_scene, compare, compare_fields),
     CYAML_FIELD_END,
 };
 // NOLINTEND

@@ -45,6 +45,7 @@ typedef struct raw_damping {
   double *mass, *stiffness;
 } raw_damping;
 typedef struct raw_simulation {
+  int *integrator;
   double *dt, *steps;
   raw_damping *damping;
 } raw_simulation;
@@ -55,6 +56,7 @@ typedef struct raw_examples {
   double *strength, *relief, *alpha;
   int *force, *solver, *path;
   raw_constraints *constraints;
+  char *algorithm;
 } raw_examples;
 typedef struct raw_push {
   raw_box *box;
@@ -73,6 +75,14 @@ typedef struct raw_output {
   int *formats;
   unsigned formats_count;
 } raw_output;
+typedef struct raw_compare {
+  double *modes, *elements, *dt;
+  unsigned modes_count, elements_count, dt_count;
+  int *methods, *materials, *reference;
+  unsigned methods_count, materials_count;
+  char **solvers, *budget;
+  unsigned solvers_count;
+} raw_compare;
 typedef struct raw_scene {
   double schema;
   char *name;
@@ -88,6 +98,7 @@ typedef struct raw_scene {
   raw_load *loads;
   unsigned loads_count;
   raw_output *output;
+  raw_compare *compare;
 } raw_scene;
 
 extern const cyaml_schema_value_t ep_scene_schema;

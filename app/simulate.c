@@ -23,8 +23,9 @@ typedef struct simulation {
   ep_state *state;
   ep_step_def def;
   timed_solver solver;
-  double *load;  // (nloads x r) generalised force at full strength
-  double *force; // (r) of the step at hand
+  double *load;            // (nloads x r) generalised force at full strength
+  double *force;           // (r) of the step at hand
+  double elastic, kinetic; // of the last step
   ep_record *record;
 } simulation;
 
@@ -45,33 +46,39 @@ double ep_load_profile(const ep_load *load, double t) {
   return fmin(1, fmin((t - load->from) / load->ramp, (load->until - t) / load->ramp));
 }
 
-// Nodal forces of a load (n x 3), U^T of them into out (r).
-static ep_status project_load(const ep_load *load, const ep_shapes *shapes, const ep_model *model,
-                              const double *mass, double *out, ep_error *err) {
-  const ep_mesh *mesh = &shapes->shape[0].mesh;
-  const int n = mesh->nv;
-  unsigned char *chosen = calloc((size_t)n, 1);
+ep_status ep_load_forces(const ep_load *load, const ep_mesh *mesh, const double *mass, double *out,
+                         ep_error *err) {
+  const size_t n = (size_t)mesh->nv;
+  unsigned char *chosen = calloc(n, 1);
   if (!chosen) return ep_fail(err, EP_ERR_MEMORY, "no memory for the loads");
   ep_status status = EP_OK;
   double total = 1; // gravity acts on each vertex with its own mass
   if (load->gravity) {
-    memset(chosen, 1, (size_t)n);
+    memset(chosen, 1, n);
   } else {
     int count;
     status = ep_select_vertices(&load->where, mesh, chosen, &count, err);
     total = 0;
-    for (int v = 0; v < n; v++) total += chosen[v] ? mass[v] : 0;
+    for (size_t v = 0; v < n; v++) total += chosen[v] ? mass[v] : 0;
   }
-  for (int a = 0; a < model->size.r && status == EP_OK; a++) {
-    const double *u = model->u + (size_t)a * 3 * (size_t)n;
-    out[a] = 0;
-    for (int v = 0; v < n; v++) {
-      if (!chosen[v]) continue;
-      const double *x = u + 3 * (size_t)v, *f = load->vector;
-      out[a] += mass[v] / total * (x[0] * f[0] + x[1] * f[1] + x[2] * f[2]);
-    }
-  }
+  for (size_t i = 0; i < 3 * n; i++)
+    out[i] = status == EP_OK && chosen[i / 3] ? mass[i / 3] / total * load->vector[i % 3] : 0;
   free(chosen);
+  return status;
+}
+
+// U^T of a load's nodal forces into out (r).
+static ep_status project_load(const ep_load *load, const ep_shapes *shapes, const ep_model *model,
+                              const double *mass, double *out, ep_error *err) {
+  const size_t n3 = 3 * (size_t)model->size.n;
+  double *forces = malloc(n3 * sizeof *forces);
+  if (!forces) return ep_fail(err, EP_ERR_MEMORY, "no memory for the loads");
+  const ep_status status = ep_load_forces(load, &shapes->shape[0].mesh, mass, forces, err);
+  for (int a = 0; a < model->size.r && status == EP_OK; a++) {
+    out[a] = 0;
+    for (size_t i = 0; i < n3; i++) out[a] += model->u[(size_t)a * n3 + i] * forces[i];
+  }
+  free(forces);
   return status;
 }
 
@@ -106,6 +113,8 @@ static ep_status advance(simulation *s, double t, double dt, int level) {
   set_force(s, t + dt);
   const ep_status status = ep_step(s->state, &s->def, &report);
   s->record->newton_iterations += report.newton_iterations;
+  s->elastic = report.elastic_energy;
+  s->kinetic = report.kinetic_energy;
   if (status != EP_ERR_NUMERIC || level == HALVINGS_MAX) return status;
   s->record->halvings++;
   const ep_status first = advance(s, t, dt / 2, level + 1);
@@ -119,13 +128,15 @@ static ep_status make_record(const ep_scene *scene, const ep_model *model, ep_re
   memset(out, 0, sizeof *out);
   out->time = calloc(rows, sizeof *out->time);
   out->q = calloc(rows * r, sizeof *out->q);
+  out->velocity = calloc(rows * r, sizeof *out->velocity);
+  out->energy = calloc(rows, sizeof *out->energy);
   out->step_ms = calloc(rows, sizeof *out->step_ms);
   out->target_ms = calloc(rows, sizeof *out->target_ms);
   const bool lb = model->size.k && model->size.m, green = model->size.greens > 0;
   if (lb) out->weights = calloc(rows * shapes, sizeof *out->weights);
   if (green) out->green_weights = calloc(rows * shapes, sizeof *out->green_weights);
-  const bool good = out->time && out->q && out->step_ms && out->target_ms &&
-                    (out->weights || !lb) && (out->green_weights || !green);
+  const bool good = out->time && out->q && out->velocity && out->energy && out->step_ms &&
+                    out->target_ms && (out->weights || !lb) && (out->green_weights || !green);
   if (good) return EP_OK;
   ep_record_free(out);
   return ep_fail(err, EP_ERR_MEMORY, "no memory for %d steps of %d modes", scene->steps,
@@ -148,6 +159,8 @@ static ep_status note(simulation *s, const ep_mesh *mesh, double *x) {
   ep_record *record = s->record;
   const size_t row = (size_t)record->rows, r = (size_t)s->model->size.r;
   memcpy(record->q + row * r, ep_state_q(s->state), r * sizeof *record->q);
+  memcpy(record->velocity + row * r, ep_state_velocity(s->state), r * sizeof *record->velocity);
+  record->energy[row] = s->elastic + s->kinetic;
   if (record->weights) {
     const ep_status status =
         note_weights(s, record->weights + row * (size_t)(s->model->size.k + 1));
@@ -198,6 +211,7 @@ static ep_status run_steps(simulation *s, const ep_mesh *mesh, ep_log *log, ep_e
 static void set_up_step(simulation *s, ep_nlopt_target *nlopt) {
   const ep_scene *scene = s->scene;
   s->def = ep_default_step();
+  s->def.integrator = scene->integrator;
   s->def.force = s->force;
   s->def.damping_mass = scene->damping_mass;
   s->def.damping_stiffness = scene->damping_stiffness;
@@ -226,7 +240,7 @@ ep_status ep_simulate(const ep_scene *scene, const ep_shapes *shapes, const ep_m
   }
   if (status == EP_OK) status = make_loads(&s, shapes, err);
   if (status == EP_OK && model->size.k && model->size.m && scene->solver == EP_SOLVER_NLOPT)
-    status = ep_nlopt_target_create(s.state, NULL, 0, &nlopt, err);
+    status = ep_nlopt_target_create(s.state, scene->algorithm, 0, &nlopt, err);
   if (status == EP_OK) {
     set_up_step(&s, nlopt);
     status = run_steps(&s, &shapes->shape[0].mesh, log, err);
@@ -242,6 +256,8 @@ ep_status ep_simulate(const ep_scene *scene, const ep_shapes *shapes, const ep_m
 void ep_record_free(ep_record *record) {
   free(record->time);
   free(record->q);
+  free(record->velocity);
+  free(record->energy);
   free(record->weights);
   free(record->green_weights);
   free(record->step_ms);

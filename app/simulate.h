@@ -6,11 +6,12 @@
 #include "app/shapes.h"
 
 typedef struct ep_record {
-  int rows;     // steps done + 1 (row 0 is rest)
-  double *time; // (rows) [s]
-  double *q;    // (rows x r)
-  double
-      *weights; // (rows x (k + 1)), the rest shape's first; NULL without the path over descriptors
+  int rows;              // steps done + 1 (row 0 is rest)
+  double *time;          // (rows) [s]
+  double *q;             // (rows x r)
+  double *velocity;      // (rows x r)
+  double *energy;        // (rows) elastic + kinetic, by the model's own quadrature [J]
+  double *weights;       // (rows x (k + 1)), the rest shape's first; NULL without that path
   double *green_weights; // (rows x k) of the Green-strain path; NULL without it
   double *step_ms;       // (rows - 1) wall time of each step, interpolation included
   double *target_ms;     // (rows - 1) of the interpolation alone
@@ -32,6 +33,11 @@ double ep_median(int count, const double *value);
 // How far shape q has gone from rest towards an example, <u, u_ex>_M / <u_ex, u_ex>_M. The modes
 // are mass-orthonormal, so this is q . q_ex / |q_ex|^2.
 double ep_example_fraction(const ep_model *model, const double *q, int example);
+
+// Nodal forces of a load at full strength (3n) [N]: gravity by the vertices' lumped masses (mass,
+// n), a push spread over the chosen vertices by theirs. Errors: those of selections.
+ep_status ep_load_forces(const ep_load *load, const ep_mesh *mesh, const double *mass, double *out,
+                         ep_error *err);
 
 // Strength of a push at time t: 0 outside from..until, linear rise and fall over `ramp`.
 double ep_load_profile(const ep_load *load, double t);
