@@ -4,6 +4,7 @@
 
 #include "app/blas_core.h"
 #include "app/commands.h"
+#include "app/compare.h"
 #include "app/quality_json.h"
 #include "app/report.h"
 
@@ -51,6 +52,9 @@ int main(int argc, char **argv) {
   switch (cli.command) {
   case EP_COMMAND_EIGEN:
     status = ep_command_eigen(&cli, &err);
+    break;
+  case EP_COMMAND_COMPARE:
+    status = ep_command_compare(&cli, &err);
     break;
   case EP_COMMAND_ALIGN:
   case EP_COMMAND_BAKE:

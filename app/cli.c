@@ -13,6 +13,7 @@ static const char general_help[] =
     "Elastic objects that deform the way example poses suggest, even poses of other meshes.\n"
     "\n"
     "  run    simulate a scene (baking first what is not baked yet) and write the animation\n"
+    "  compare  measure methods and settings of a scene against the full space\n"
     "  bake   prepare a scene: poses, basis, cubature, model; kept in the cache\n"
     "  plan   say which stages a scene needs, and why the others are left out\n"
     "  align  map the examples of a scene to its object and judge the maps\n"
@@ -91,6 +92,12 @@ static const struct {
                          scene_options},
     [EP_COMMAND_BAKE] = {"bake", "SCENE",
                          "Compute everything a run needs and keep it in the cache.", scene_options},
+    [EP_COMMAND_COMPARE] = {"compare", "SCENE",
+                            "Simulate a scene by every method and setting of its `compare` section "
+                            "and report error against run time: a page, its chart, tables. "
+                            "Finished points are kept in the cache: an interrupted sweep goes on "
+                            "where it stopped.",
+                            run_options},
     [EP_COMMAND_RUN] = {"run", "SCENE",
                         "Simulate a scene. Leaves the animation (.vtu/.pvd, .glb), a picture, the "
                         "trajectory and a summary in the folder of the results.",

@@ -16,6 +16,7 @@ typedef enum ep_command {
   EP_COMMAND_PLAN,
   EP_COMMAND_BAKE,
   EP_COMMAND_RUN,
+  EP_COMMAND_COMPARE,
   EP_COMMANDS
 } ep_command;
 

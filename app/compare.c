@@ -1,0 +1,322 @@
+// The sweep: which points, what is cached, the reference, the order of work.
+#include "app/compare.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "app/report.h"
+#include "app/session.h"
+#include "linalg/petsc.h"
+
+enum { FRAMES_MAX = 120 };
+
+typedef struct sweep {
+  const ep_cli *cli;
+  ep_session *session;
+  ep_comparison result;
+  ep_frames shape; // count, interval, n3 of all frames; no data
+  ep_frames reference;
+  int reference_material; // -1: none loaded
+  bool petsc;
+  int done;
+} sweep;
+
+// ---- points ------------------------------------------------------------------------------------
+
+static bool wants(const ep_sweep *s, ep_method method) {
+  for (int i = 0; i < s->nmethods; i++)
+    if (s->method[i] == method) return true;
+  return false;
+}
+
+static void add(ep_comparison *c, ep_point point) {
+  if (c->point) c->point[c->count] = point;
+  c->count++;
+}
+
+// The cubic polynomials are those of StVK.
+static bool is_stvk(ep_material m) {
+  return m == EP_STVK || m == EP_STVK_VOLUME;
+}
+
+// All points of one material, r and time step.
+static void add_reduced(ep_comparison *c, const ep_sweep *s, ep_point point) {
+  const int solvers = c->examples ? s->nsolvers : 1;
+  for (int i = 0; i < solvers; i++) {
+    point.solver = c->examples ? s->solver[i] : "";
+    point.method = EP_METHOD_CUBATURE;
+    for (int j = 0; j < s->nelements && wants(s, EP_METHOD_CUBATURE); j++) {
+      point.s = s->elements[j];
+      if (point.s < c->tets) add(c, point);
+    }
+    point.method = EP_METHOD_CUBIC;
+    point.s = 0;
+    if (wants(s, EP_METHOD_CUBIC) && is_stvk(point.material)) add(c, point);
+    point.method = EP_METHOD_ALL;
+    point.s = c->tets;
+    if (wants(s, EP_METHOD_ALL)) add(c, point);
+  }
+}
+
+static void list_points(ep_comparison *c, const ep_sweep *s) {
+  c->count = 0;
+  for (int m = 0; m < s->nmaterials; m++) {
+    for (int r = 0; r < s->nmodes; r++)
+      for (int t = 0; t < s->ndt; t++)
+        add_reduced(c, s, (ep_point){.material = s->material[m], .r = s->modes[r], .dt = s->dt[t]});
+    for (int t = 0; t < s->ndt && wants(s, EP_METHOD_FULL); t++)
+      add(c, (ep_point){.method = EP_METHOD_FULL,
+                        .material = s->material[m],
+                        .r = s->modes[s->nmodes - 1],
+                        .dt = s->dt[t],
+                        .solver = c->examples ? "newton" : ""});
+  }
+}
+
+static ep_status make_points(sweep *w, ep_error *err) {
+  list_points(&w->result, &w->session->scene.sweep); // counts
+  w->result.point = calloc((size_t)w->result.count, sizeof *w->result.point);
+  if (!w->result.point) return ep_fail(err, EP_ERR_MEMORY, "no memory for a comparison");
+  list_points(&w->result, &w->session->scene.sweep);
+  return EP_OK;
+}
+
+// All runs meet every `interval`: the longest time step, or as many of it as keep the frames few.
+static void choose_frames(sweep *w) {
+  const ep_scene *scene = &w->session->scene;
+  const double longest = scene->sweep.dt[0];
+  const int steps = (int)fmax(1, floor(scene->dt * scene->steps / longest + 1e-6));
+  const int every = (steps + FRAMES_MAX - 1) / FRAMES_MAX;
+  w->shape = (ep_frames){.count = steps / every,
+                         .interval = every * longest,
+                         .n3 = 3 * (size_t)w->session->shapes.shape[0].mesh.nv};
+  w->result.frames = w->shape.count;
+  w->result.frame_interval = w->shape.interval;
+}
+
+// ---- cache -------------------------------------------------------------------------------------
+
+static ep_digest point_key(const sweep *w, const ep_bench *bench, const ep_point *p,
+                           const char *what) {
+  const ep_sweep *s = &w->session->scene.sweep;
+  char kind[256];
+  snprintf(kind, sizeof kind, "%s %s s %d dt %.17g solver %s reference %s r %d dt %.17g", what,
+           ep_method_name(p->method), p->s, p->dt, p->solver, ep_method_name(s->reference),
+           s->modes[s->nmodes - 1], s->dt[s->ndt - 1]);
+  return ep_bench_key(bench, kind, &w->shape);
+}
+
+enum {
+  NUMBERS = 0
+#define X(name, text) +1
+  EP_POINT_NUMBERS(X)
+#undef X
+};
+
+static bool take_point(const sweep *w, const ep_digest *key, ep_point *p) {
+  ep_artifact artifact;
+  if (!ep_cache_find(&w->session->cache, "compare", key, &w->session->log, &artifact)) return false;
+  const double *numbers = ep_artifact_array(&artifact, "numbers", EP_F64, NUMBERS);
+  const double *error = ep_artifact_array(&artifact, "error", EP_F64, (size_t)w->shape.count);
+  p->error_at = calloc((size_t)w->shape.count + 1, sizeof *p->error_at);
+  p->cached = numbers && error && p->error_at;
+  if (p->cached) {
+    memcpy(p->error_at, error, (size_t)w->shape.count * sizeof *error);
+#define X(name, text) p->name = *numbers++;
+    EP_POINT_NUMBERS(X)
+#undef X
+  }
+  ep_artifact_close(&artifact);
+  return p->cached;
+}
+
+static ep_status store_point(const sweep *w, const ep_digest *key, const ep_point *p,
+                             ep_error *err) {
+  const double numbers[NUMBERS] = {
+#define X(name, text) p->name,
+      EP_POINT_NUMBERS(X)
+#undef X
+  };
+  const ep_tensor tensors[] = {ep_tensor_of("numbers", EP_F64, numbers, NUMBERS, 0, 0),
+                               ep_tensor_of("error", EP_F64, p->error_at, w->shape.count, 0, 0)};
+  return ep_cache_store(&w->session->cache, "compare", key, 2, tensors, 0, NULL, err);
+}
+
+// A run's frames and what was measured of it: the reference, and full-space runs.
+static bool take_run(const sweep *w, const ep_digest *key, ep_point *p, ep_frames *frames) {
+  ep_artifact artifact;
+  if (!ep_cache_find(&w->session->cache, "compare-run", key, &w->session->log, &artifact))
+    return false;
+  const size_t count = (size_t)frames->count, size = count * frames->n3;
+  const double *numbers = ep_artifact_array(&artifact, "numbers", EP_F64, NUMBERS);
+  const double *x = ep_artifact_array(&artifact, "x", EP_F64, size);
+  const double *v = ep_artifact_array(&artifact, "v", EP_F64, size);
+  const double *energy = ep_artifact_array(&artifact, "energy", EP_F64, count);
+  const bool good = numbers && x && v && energy;
+  if (good) {
+    memcpy(frames->x, x, size * sizeof *x);
+    memcpy(frames->v, v, size * sizeof *v);
+    memcpy(frames->energy, energy, count * sizeof *energy);
+#define X(name, text) p->name = *numbers++;
+    EP_POINT_NUMBERS(X)
+#undef X
+  }
+  ep_artifact_close(&artifact);
+  return good;
+}
+
+static ep_status store_run(const sweep *w, const ep_digest *key, const ep_point *p,
+                           const ep_frames *frames, ep_error *err) {
+  const double numbers[NUMBERS] = {
+#define X(name, text) p->name,
+      EP_POINT_NUMBERS(X)
+#undef X
+  };
+  const ep_tensor tensors[] = {
+      ep_tensor_of("numbers", EP_F64, numbers, NUMBERS, 0, 0),
+      ep_tensor_of("x", EP_F64, frames->x, frames->count, (int64_t)frames->n3, 0),
+      ep_tensor_of("v", EP_F64, frames->v, frames->count, (int64_t)frames->n3, 0),
+      ep_tensor_of("energy", EP_F64, frames->energy, frames->count, 0, 0)};
+  return ep_cache_store(&w->session->cache, "compare-run", key, 4, tensors, 0, NULL, err);
+}
+
+// ---- runs --------------------------------------------------------------------------------------
+
+static ep_status start_petsc(sweep *w, ep_error *err) {
+  if (w->petsc) return EP_OK;
+  EP_TRY(ep_petsc_start(err));
+  w->petsc = true;
+  return EP_OK;
+}
+
+// A run with its frames, from the cache where it is kept whole.
+static ep_status get_run(sweep *w, ep_bench *bench, ep_point *p, bool keep, ep_frames *frames,
+                         ep_error *err) {
+  const ep_digest key = point_key(w, bench, p, "run");
+  EP_TRY(ep_frames_make(w->shape.count, w->shape.interval, w->shape.n3, frames, err));
+  if (keep && take_run(w, &key, p, frames)) return EP_OK;
+  EP_TRY(start_petsc(w, err));
+  EP_TRY(p->method == EP_METHOD_FULL ? ep_compare_full(bench, p, frames, err)
+                                     : ep_compare_reduced(bench, p, frames, err));
+  return keep ? store_run(w, &key, p, frames, err) : EP_OK;
+}
+
+// The trajectory all points of a material are measured against: the finest time step, the most
+// modes of the sweep.
+static ep_status get_reference(sweep *w, ep_material material, ep_error *err) {
+  const ep_scene *scene = &w->session->scene;
+  const ep_sweep *s = &scene->sweep;
+  if (w->reference_material == (int)material) return EP_OK;
+  ep_frames_free(&w->reference);
+  w->reference_material = -1;
+  ep_point p = {.method = s->reference,
+                .material = material,
+                .r = s->modes[s->nmodes - 1],
+                .s = s->reference == EP_METHOD_ALL ? w->result.tets : 0,
+                .dt = s->dt[s->ndt - 1],
+                .solver = w->result.examples ? "newton" : ""};
+  ep_bench bench;
+  EP_TRY(ep_bench_open(scene, material, p.r, &w->session->cache, &w->session->log, &bench, err));
+  const ep_status status = get_run(w, &bench, &p, true, &w->reference, err);
+  ep_bench_close(&bench);
+  if (status != EP_OK) return ep_fail_context(err, "reference run");
+  w->reference_material = (int)material;
+  return EP_OK;
+}
+
+static ep_status compute_point(sweep *w, ep_bench *bench, const ep_digest *key, ep_point *p,
+                               ep_error *err) {
+  ep_frames frames = {0};
+  EP_TRY(get_reference(w, p->material, err));
+  ep_error here = {0};
+  ep_status status = get_run(w, bench, p, p->method == EP_METHOD_FULL, &frames, &here);
+  if (status == EP_OK)
+    status = ep_compare_errors(&frames, &w->reference, w->result.diagonal, p, &here);
+  ep_frames_free(&frames);
+  if (status == EP_OK) return store_point(w, key, p, err);
+  // A setting that cannot be run is a result too; what a later try may cure is not.
+  if (status != EP_ERR_NUMERIC && status != EP_ERR_UNSUPPORTED && status != EP_ERR_ARGUMENT)
+    return ep_fail(err, status, "%s", here.text);
+  p->failed = true;
+  snprintf(p->why, sizeof p->why, "%.255s", here.text);
+  ep_warn(&w->session->log, "%s, r = %d, s = %d: %s", ep_method_name(p->method), p->r, p->s,
+          here.text);
+  return EP_OK;
+}
+
+// Points with the same material and r stand together: one bench serves them.
+static ep_status do_group(sweep *w, int first, int *next, ep_error *err) {
+  ep_comparison *c = &w->result;
+  const ep_point *lead = &c->point[first];
+  ep_bench bench;
+  EP_TRY(ep_bench_open(&w->session->scene, lead->material, lead->r, &w->session->cache,
+                       &w->session->log, &bench, err));
+  ep_status status = EP_OK;
+  int i = first;
+  for (; i < c->count && status == EP_OK; i++) {
+    ep_point *p = &c->point[i];
+    if (p->material != lead->material || p->r != lead->r) break;
+    const ep_digest key = point_key(w, &bench, p, "point");
+    if (!take_point(w, &key, p)) status = compute_point(w, &bench, &key, p, err);
+    ep_progress_begin(&w->session->log, "compare", c->count);
+    ep_progress(&w->session->log, ++w->done);
+  }
+  ep_bench_close(&bench);
+  *next = i;
+  return status;
+}
+
+static ep_status do_all(sweep *w, ep_error *err) {
+  EP_TRY(make_points(w, err));
+  choose_frames(w);
+  ep_status status = EP_OK;
+  for (int i = 0; i < w->result.count && status == EP_OK;) status = do_group(w, i, &i, err);
+  ep_progress_end(&w->session->log);
+  return status;
+}
+
+// ---- command -----------------------------------------------------------------------------------
+
+static ep_status output(const sweep *w, ep_error *err) {
+  char fallback[EP_PATH_MAX];
+  const char *folder = w->cli->out;
+  if (!folder) {
+    snprintf(fallback, sizeof fallback, "results/%s-compare", w->result.name);
+    folder = fallback;
+  }
+  EP_TRY(ep_compare_write(folder, &w->result, err));
+  if (w->cli->json) return ep_report_print(ep_compare_json(&w->result), err);
+  ep_compare_text(stdout, &w->result);
+  printf("report: %s/index.html\n", folder);
+  return EP_OK;
+}
+
+ep_status ep_command_compare(const ep_cli *cli, ep_error *err) {
+  ep_session session;
+  EP_TRY(ep_session_open(cli, &session, err));
+  if (session.scene.green.alpha > 0) {
+    ep_session_close(&session);
+    return ep_fail(err, EP_ERR_UNSUPPORTED,
+                   "compare does not know the Green-strain potential of the examples yet; compare "
+                   "with --set examples.path=lb");
+  }
+  const ep_mesh *mesh = &session.shapes.shape[0].mesh;
+  sweep w = {.cli = cli,
+             .session = &session,
+             .reference_material = -1,
+             .result = {.scene = &session.scene,
+                        .name = session.scene.name,
+                        .vertices = mesh->nv,
+                        .tets = mesh->nt,
+                        .examples = session.shapes.examples,
+                        .diagonal = ep_mesh_diagonal(mesh)}};
+  ep_status status = do_all(&w, err);
+  if (status == EP_OK) status = output(&w, err);
+  if (w.petsc) ep_petsc_stop();
+  for (int i = 0; i < w.result.count && w.result.point; i++) free(w.result.point[i].error_at);
+  free(w.result.point);
+  ep_frames_free(&w.reference);
+  ep_session_close(&session);
+  return status;
+}

@@ -1,0 +1,112 @@
+// `eigenpose compare`: the scene simulated by every method and setting of its sweep, each measured
+// against one reference trajectory. Runs in the baker process (PETSc).
+#ifndef EP_APP_COMPARE_H
+#define EP_APP_COMPARE_H
+
+#include <jansson.h>
+#include <stdio.h>
+
+#include "app/bake.h"
+#include "app/cli.h"
+#include "app/simulate.h"
+#include "reduced/bake/model_build.h"
+
+// What is measured of a point, in the order it is cached and tabulated:
+//   X(name, what the table says)
+#define EP_POINT_NUMBERS(X)                                                                        \
+  X(offline_s, "offline [s]")                                                                      \
+  X(memory_bytes, "memory [bytes]") /* of a step: model without what only display needs, state */  \
+  X(step_min_us, "step, min [us]")                                                                 \
+  X(step_median_us, "step, median [us]")                                                           \
+  X(target_median_us, "of it interpolation [us]")                                                  \
+  X(force_error, "force error")       /* |f - U^T f_full| / |U^T f_full|, rms on its own path */   \
+  X(position_error, "position error") /* largest over vertices and time, over the diagonal */      \
+  X(velocity_error, "velocity error") /* the same over the reference's largest speed */            \
+  X(energy_error, "energy drift")     /* largest |E - E_ref| over the largest E_ref, E = W + T */  \
+  X(newton_per_step, "Newton per step")                                                            \
+  X(halvings, "halved steps")                                                                      \
+  X(inverted, "inverted tets")
+
+typedef struct ep_point {
+  ep_method method;
+  ep_material material;
+  int r, s;           // s: elements used, 0 for cubic and full
+  double dt;          // [s]
+  const char *solver; // of the interpolation; "" without examples. Borrowed
+  bool cached, failed;
+  char why[256]; // where it failed
+#define X(name, text) double name;
+  EP_POINT_NUMBERS(X)
+#undef X
+  double *error_at; // (frames) position error over time
+} ep_point;
+
+// Times all runs meet at, every `every`-th of the longest time step.
+typedef struct ep_frames {
+  int count;
+  double interval; // [s]; frame i is at (i + 1) interval
+  size_t n3;
+  double *x, *v;  // (count x n3) displacements, velocities
+  double *energy; // (count) elastic + kinetic
+} ep_frames;
+ep_status ep_frames_make(int count, double interval, size_t n3, ep_frames *out, ep_error *err);
+void ep_frames_free(ep_frames *frames);
+
+typedef struct ep_comparison {
+  const ep_scene *scene;
+  const char *name;
+  int vertices, tets, examples;
+  double diagonal;
+  int frames;
+  double frame_interval;
+  int count;
+  ep_point *point; // (count)
+} ep_comparison;
+
+// ---- one material and one r: everything of the bake up to the basis ---------------------------
+typedef struct ep_bench {
+  ep_scene scene; // the given one with this r and material; its pointers are borrowed
+  const ep_cache *cache;
+  ep_log *log;
+  ep_shapes shapes;
+  ep_plan plan;
+  ep_bake bake;
+  bool open;            // bake is open and has its basis
+  double basis_seconds; // of the basis, always measured anew
+} ep_bench;
+// Reads the meshes and plans; ep_bench_prepare bakes (PETSc must run).
+ep_status ep_bench_open(const ep_scene *scene, ep_material material, int r, const ep_cache *cache,
+                        ep_log *log, ep_bench *out, ep_error *err);
+ep_status ep_bench_prepare(ep_bench *bench, ep_error *err);
+void ep_bench_close(ep_bench *bench);
+// A name for results of this bench, its scene's simulation and what `kind` says.
+ep_digest ep_bench_key(const ep_bench *bench, const char *kind, const ep_frames *frames);
+// A model with all elements (s = 0) or the cubature `c`; free with ep_model_memory_free.
+ep_status ep_bench_model(ep_bench *bench, const ep_cubature *c, ep_model_memory *out,
+                         ep_error *err);
+
+// ---- points ------------------------------------------------------------------------------------
+// Simulate in the full space with point->dt; fills frames and what is measured of the run itself.
+ep_status ep_compare_full(ep_bench *bench, ep_point *point, ep_frames *frames, ep_error *err);
+// The same for a reduced method.
+ep_status ep_compare_reduced(ep_bench *bench, ep_point *point, ep_frames *frames, ep_error *err);
+// Errors of a run against the reference, into point.
+ep_status ep_compare_errors(const ep_frames *run, const ep_frames *reference, double diagonal,
+                            ep_point *point, ep_error *err);
+
+// ---- what comes of it --------------------------------------------------------------------------
+// The fastest point below the scene's budgets, or -1; why (256) says how it was chosen.
+int ep_compare_recommend(const ep_comparison *c, char *why);
+// At each dt and solver of the sweep: from which r on cubature (s elements) is faster than the
+// polynomials; NAN where it never is or was not compared. Between two r of the sweep by
+// interpolation of the logarithms.
+double ep_compare_crossover(const ep_comparison *c, int s);
+
+// index.html, chart.svg, chart.png, results.csv, results.json in `folder`.
+ep_status ep_compare_write(const char *folder, const ep_comparison *c, ep_error *err);
+json_t *ep_compare_json(const ep_comparison *c);
+void ep_compare_text(FILE *out, const ep_comparison *c);
+
+ep_status ep_command_compare(const ep_cli *cli, ep_error *err);
+
+#endif

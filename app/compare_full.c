@@ -1,0 +1,158 @@
+// The full-space run of a comparison.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "app/compare.h"
+#include "reduced/bake/full_step.h"
+
+enum { HALVINGS_MAX = 6 };
+
+typedef struct run {
+  ep_bench *bench;
+  ep_full *full;
+  ep_step_def def;
+  double *load, *force; // (nloads x n3) at full strength, (n3) of the step at hand
+  double energy;        // elastic + kinetic of the last step
+  double target_seconds;
+  int newton, halvings;
+} run;
+
+static ep_status make_loads(run *r, ep_error *err) {
+  const ep_shapes *shapes = &r->bench->shapes;
+  const ep_scene *scene = &r->bench->scene;
+  const size_t n3 = 3 * (size_t)shapes->shape[0].mesh.nv;
+  double *mass = malloc(n3 * sizeof *mass);
+  r->load = calloc((size_t)scene->nloads * n3 + 1, sizeof *r->load);
+  r->force = calloc(n3, sizeof *r->force);
+  ep_status status = EP_OK;
+  if (!mass || !r->load || !r->force)
+    status = ep_fail(err, EP_ERR_MEMORY, "no memory for the loads");
+  if (status == EP_OK) ep_shapes_vertex_mass(shapes, mass);
+  for (int i = 0; i < scene->nloads && status == EP_OK; i++)
+    status = ep_load_forces(&scene->load[i], &shapes->shape[0].mesh, mass, r->load + (size_t)i * n3,
+                            err);
+  free(mass);
+  return status;
+}
+
+static void set_force(run *r, double t) {
+  const ep_scene *scene = &r->bench->scene;
+  const size_t n3 = 3 * (size_t)r->bench->shapes.shape[0].mesh.nv;
+  memset(r->force, 0, n3 * sizeof *r->force);
+  for (int i = 0; i < scene->nloads; i++) {
+    const double strength = ep_load_profile(&scene->load[i], t);
+    for (size_t j = 0; j < n3; j++) r->force[j] += strength * r->load[(size_t)i * n3 + j];
+  }
+}
+
+// As in app/simulate.c: a failed step is done in two halves.
+static ep_status advance(run *r, double t, double dt, int level, ep_error *err) {
+  ep_full_report report;
+  ep_error here = {0};
+  r->def.dt = dt;
+  set_force(r, t + dt);
+  const ep_status status = ep_full_step(r->full, &r->def, &report, &here);
+  r->newton += report.newton_iterations;
+  r->energy = report.elastic_energy + report.kinetic_energy;
+  if (status == EP_OK) return EP_OK;
+  if (status != EP_ERR_NUMERIC || level == HALVINGS_MAX)
+    return ep_fail(err, status, "t = %.4g s: %s", t, here.text);
+  r->halvings++;
+  EP_TRY(advance(r, t, dt / 2, level + 1, err));
+  return advance(r, t + dt / 2, dt / 2, level + 1, err);
+}
+
+static ep_status timed_newton(void *user, ep_state *state, const double *w, double *q,
+                              double tolerance, ep_target_report *report) {
+  run *r = user;
+  const double started = ep_seconds();
+  const ep_status status = ep_target_newton(NULL, state, w, q, tolerance, report);
+  r->target_seconds += ep_seconds() - started;
+  return status;
+}
+
+static void set_up_step(run *r, bool examples) {
+  const ep_scene *scene = &r->bench->scene;
+  r->def = ep_default_step();
+  r->def.integrator = scene->integrator;
+  r->def.force = r->force;
+  r->def.damping_mass = scene->damping_mass;
+  r->def.damping_stiffness = scene->damping_stiffness;
+  r->def.strength = examples ? scene->strength : 0;
+  r->def.example_force = scene->force;
+  r->def.target_solver = timed_newton;
+  r->def.target_user = r;
+}
+
+static ep_status all_steps(run *r, ep_point *point, ep_frames *frames, ep_error *err) {
+  const int steps = (int)lround(frames->interval * frames->count / point->dt);
+  const int stride = (int)lround(frames->interval / point->dt);
+  const ep_mesh *mesh = &r->bench->shapes.shape[0].mesh;
+  double *us = malloc(2 * (size_t)steps * sizeof *us);
+  double *x = malloc(frames->n3 * sizeof *x);
+  ep_status status = us && x ? EP_OK : ep_fail(err, EP_ERR_MEMORY, "no memory for a run");
+  ep_progress_begin(r->bench->log, "full space", steps);
+  for (int i = 0; i < steps && status == EP_OK; i++) {
+    const double started = ep_seconds();
+    r->target_seconds = 0;
+    status = advance(r, i * point->dt, point->dt, 0, err);
+    us[i] = 1e6 * (ep_seconds() - started);
+    us[steps + i] = 1e6 * r->target_seconds;
+    ep_progress(r->bench->log, i + 1);
+    if ((i + 1) % stride || status != EP_OK) continue;
+    const size_t frame = (size_t)(i + 1) / (size_t)stride - 1;
+    memcpy(frames->x + frame * frames->n3, ep_full_displacement(r->full), frames->n3 * sizeof *x);
+    memcpy(frames->v + frame * frames->n3, ep_full_velocity(r->full), frames->n3 * sizeof *x);
+    frames->energy[frame] = r->energy;
+    for (size_t j = 0; j < frames->n3; j++) x[j] = mesh->x[j] + ep_full_displacement(r->full)[j];
+    point->inverted = fmax(point->inverted, ep_mesh_inverted(mesh, x, NULL));
+  }
+  ep_progress_end(r->bench->log);
+  if (status == EP_OK) {
+    point->step_median_us = ep_median(steps, us);
+    point->target_median_us = ep_median(steps, us + steps);
+    point->step_min_us = us[0];
+    for (int i = 1; i < steps; i++) point->step_min_us = fmin(point->step_min_us, us[i]);
+    point->newton_per_step = (double)r->newton / steps;
+    point->halvings = r->halvings;
+  }
+  free(us);
+  free(x);
+  return status;
+}
+
+static ep_status simulate(run *r, ep_state *examples, ep_point *point, ep_frames *frames,
+                          ep_error *err) {
+  const double started = ep_seconds();
+  EP_TRY(ep_full_create(&r->bench->bake.fem, examples, &r->full, err));
+  point->offline_s = ep_seconds() - started;
+  point->memory_bytes = (double)ep_full_bytes(r->full);
+  EP_TRY(make_loads(r, err));
+  set_up_step(r, examples != NULL);
+  return all_steps(r, point, frames, err);
+}
+
+// The example forces come from this bench's subspace with all elements.
+ep_status ep_compare_full(ep_bench *bench, ep_point *point, ep_frames *frames, ep_error *err) {
+  run r = {.bench = bench};
+  ep_model_memory memory = {.count = 0};
+  ep_state *state = NULL;
+  void *block = NULL;
+  ep_status status = ep_bench_prepare(bench, err);
+  if (status == EP_OK && bench->shapes.examples) {
+    status = ep_bench_model(bench, NULL, &memory, err);
+    const size_t bytes = status == EP_OK ? (ep_state_bytes(&memory.model) + 63) / 64 * 64 : 0;
+    if (status == EP_OK && !(block = aligned_alloc(64, bytes)))
+      status = ep_fail(err, EP_ERR_MEMORY, "no memory for a state");
+    if (status == EP_OK && ep_state_init(&memory.model, block, bytes, &state) != EP_OK)
+      status = ep_fail(err, EP_ERR_NUMERIC, "cannot set up a state of the model");
+  }
+  if (status == EP_OK) status = simulate(&r, state, point, frames, err);
+  ep_full_free(r.full);
+  free(r.load);
+  free(r.force);
+  free(block);
+  ep_model_memory_free(&memory);
+  return status;
+}

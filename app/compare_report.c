@@ -1,0 +1,177 @@
+// What comes of a comparison in words and numbers: recommendation, crossover, JSON, text.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "app/compare.h"
+#include "app/report.h"
+
+// ---- recommendation ----------------------------------------------------------------------------
+
+static bool fits(const ep_sweep *s, const ep_point *p) {
+  return !p->failed && (s->budget_seconds == 0 || 1e-6 * p->step_median_us <= s->budget_seconds) &&
+         (s->budget_error == 0 || p->position_error <= s->budget_error);
+}
+
+// Errors this close count as equal: then the time decides.
+static const double SAME_ERROR = 1.02;
+
+// With an error given the fastest that fits, else the most exact that fits the time.
+static bool better(const ep_sweep *s, const ep_point *a, const ep_point *b) {
+  if (s->budget_error > 0 || (a->position_error <= SAME_ERROR * b->position_error &&
+                              b->position_error <= SAME_ERROR * a->position_error))
+    return a->step_median_us < b->step_median_us;
+  return a->position_error < b->position_error;
+}
+
+static void budget_text(const ep_sweep *s, char text[96]) {
+  char time[48] = "", error[48] = "";
+  if (s->budget_seconds > 0)
+    snprintf(time, sizeof time, "a step of at most %g ms", 1e3 * s->budget_seconds);
+  if (s->budget_error > 0)
+    snprintf(error, sizeof error, "%sa position error of at most %g %%",
+             s->budget_seconds > 0 ? " and " : "", 100 * s->budget_error);
+  snprintf(text, 96, "%.47s%.47s", time, error);
+}
+
+int ep_compare_recommend(const ep_comparison *c, char *why) {
+  const ep_sweep *s = &c->scene->sweep;
+  char budget[96];
+  int best = -1;
+  *why = '\0';
+  if (s->budget_seconds == 0 && s->budget_error == 0) return -1;
+  budget_text(s, budget);
+  for (int i = 0; i < c->count; i++)
+    if (fits(s, &c->point[i]) && (best < 0 || better(s, &c->point[i], &c->point[best]))) best = i;
+  if (best >= 0)
+    snprintf(why, 256, "the %s setting with %s", s->budget_error > 0 ? "fastest" : "most exact",
+             budget);
+  else
+    snprintf(why, 256, "no setting of this sweep has %s; sweep %s", budget,
+             s->budget_error > 0 ? "more modes or elements" : "fewer modes or elements");
+  return best;
+}
+
+// ---- crossover ---------------------------------------------------------------------------------
+
+static const ep_point *find(const ep_comparison *c, ep_method method, int r, int s,
+                            const ep_point *like) {
+  for (int i = 0; i < c->count; i++) {
+    const ep_point *p = &c->point[i];
+    if (p->method == method && p->r == r && (method != EP_METHOD_CUBATURE || p->s == s) &&
+        p->dt == like->dt && strcmp(p->solver, like->solver) == 0 &&
+        p->material == like->material && !p->failed)
+      return p;
+  }
+  return NULL;
+}
+
+// The step without the interpolation, which is the same for both.
+static double elastic_part(const ep_point *p) {
+  return p->step_median_us - p->target_median_us;
+}
+
+double ep_compare_crossover(const ep_comparison *c, int s) {
+  const ep_sweep *sweep = &c->scene->sweep;
+  double r_before = 0, ratio_before = NAN;
+  for (int i = 0; i < sweep->nmodes && c->count > 0; i++) {
+    const ep_point *a = find(c, EP_METHOD_CUBATURE, sweep->modes[i], s, &c->point[0]);
+    const ep_point *b = find(c, EP_METHOD_CUBIC, sweep->modes[i], 0, &c->point[0]);
+    if (!a || !b) continue;
+    const double ratio = log(elastic_part(a) / elastic_part(b));
+    if (ratio <= 0) {
+      if (isnan(ratio_before)) return sweep->modes[i];
+      const double t = ratio_before / (ratio_before - ratio);
+      return r_before * pow(sweep->modes[i] / r_before, t);
+    }
+    r_before = sweep->modes[i];
+    ratio_before = ratio;
+  }
+  return NAN;
+}
+
+// ---- JSON --------------------------------------------------------------------------------------
+
+static json_t *point_json(const ep_point *p, int frames) {
+  json_t *o =
+      json_pack("{s:s, s:s, s:i, s:i, s:f, s:s, s:b, s:b}", "method", ep_method_name(p->method),
+                "material", ep_material_name(p->material), "r", p->r, "s", p->s, "dt", p->dt,
+                "solver", p->solver, "cached", (int)p->cached, "failed", (int)p->failed);
+  if (!o) return NULL;
+  if (p->failed) {
+    json_object_set_new(o, "why", json_string(p->why));
+    return o;
+  }
+#define X(name, text) json_object_set_new(o, #name, ep_json_number(p->name));
+  EP_POINT_NUMBERS(X)
+#undef X
+  if (p->error_at)
+    json_object_set_new(o, "position_error_at", ep_json_numbers(frames, p->error_at));
+  return o;
+}
+
+static json_t *crossovers_json(const ep_comparison *c) {
+  const ep_sweep *s = &c->scene->sweep;
+  json_t *list = json_array();
+  for (int i = 0; list && i < s->nelements; i++)
+    json_array_append_new(list, json_pack("{s:i, s:o}", "s", s->elements[i], "r",
+                                          ep_json_number(ep_compare_crossover(c, s->elements[i]))));
+  return list;
+}
+
+json_t *ep_compare_json(const ep_comparison *c) {
+  char why[256];
+  const int best = ep_compare_recommend(c, why);
+  json_t *points = json_array();
+  for (int i = 0; points && i < c->count; i++)
+    json_array_append_new(points, point_json(&c->point[i], c->frames));
+  json_t *o =
+      json_pack("{s:s, s:i, s:i, s:i, s:s, s:i, s:f, s:o, s:o}", "scene", c->name, "vertices",
+                c->vertices, "tets", c->tets, "examples", c->examples, "reference",
+                ep_method_name(c->scene->sweep.reference), "frames", c->frames, "frame_interval",
+                c->frame_interval, "crossover", crossovers_json(c), "points", points);
+  if (o && *why)
+    json_object_set_new(o, "recommendation", json_pack("{s:i, s:s}", "point", best, "why", why));
+  return o;
+}
+
+// ---- text --------------------------------------------------------------------------------------
+
+static void text_setting(FILE *out, const ep_point *p) {
+  fprintf(out, "%-9s %-12s %4d %6d %9.3g %-12.26s ", ep_method_name(p->method),
+          ep_material_name(p->material), p->method == EP_METHOD_FULL ? 0 : p->r, p->s, p->dt,
+          p->solver);
+}
+
+void ep_compare_text(FILE *out, const ep_comparison *c) {
+  char why[256];
+  fprintf(out, "%s: %d vertices, %d tets, %d examples; errors against %s\n", c->name, c->vertices,
+          c->tets, c->examples,
+          c->scene->sweep.reference == EP_METHOD_FULL ? "the full space" : "all elements");
+  fprintf(out, "%-9s %-12s %4s %6s %9s %-12s %9s %9s %10s %9s %9s %9s %9s\n", "method", "material",
+          "r", "s", "dt", "solver", "us/step", "min", "offline s", "position", "velocity", "energy",
+          "force");
+  for (int i = 0; i < c->count; i++) {
+    const ep_point *p = &c->point[i];
+    text_setting(out, p);
+    if (p->failed)
+      fprintf(out, "failed: %s\n", p->why);
+    else
+      fprintf(out, "%9.1f %9.1f %10.2f %9.2e %9.2e %9.2e %9.2e\n", p->step_median_us,
+              p->step_min_us, p->offline_s, p->position_error, p->velocity_error, p->energy_error,
+              p->force_error);
+  }
+  for (int i = 0; i < c->scene->sweep.nelements; i++) {
+    const int s = c->scene->sweep.elements[i];
+    const double r = ep_compare_crossover(c, s);
+    if (isfinite(r)) fprintf(out, "cubature with %d elements is faster from r = %.0f on\n", s, r);
+  }
+  const int best = ep_compare_recommend(c, why);
+  if (best >= 0) {
+    fprintf(out, "recommended: ");
+    text_setting(out, &c->point[best]);
+    fprintf(out, "(%s)\n", why);
+  } else if (*why) {
+    fprintf(out, "recommended: none; %s\n", why);
+  }
+}

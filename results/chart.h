@@ -1,0 +1,38 @@
+// A chart of marks and lines with linear or logarithmic axes, as SVG (for pages and papers) and as
+// PNG; both come from the same drawing.
+#ifndef EP_RESULTS_CHART_H
+#define EP_RESULTS_CHART_H
+
+#include <stdbool.h>
+#include <stdio.h>
+
+#include "base/error.h"
+
+typedef struct ep_chart_series {
+  const char *name;
+  int n;
+  const double *x, *y;      // (n) points; those a logarithmic axis cannot hold are left out
+  const char *const *label; // (n) beside the marks, or NULL
+  bool line, marks;
+  int color; // 0..7
+} ep_chart_series;
+
+typedef struct ep_chart {
+  const char *title, *x_label, *y_label;
+  bool log_x, log_y;
+  int width, height; // pixels
+  int series;
+  const ep_chart_series *list;
+} ep_chart;
+
+// Write an <svg> element (no XML header), self-contained. Errors: EP_ERR_ARGUMENT where there is
+// nothing to draw; the stream's state tells of failed writes.
+ep_status ep_chart_svg(const ep_chart *chart, FILE *out, ep_error *err);
+ep_status ep_chart_write_svg(const char *path, const ep_chart *chart, ep_error *err);
+// Twice the chart's size in pixels.
+ep_status ep_chart_write_png(const char *path, const ep_chart *chart, ep_error *err);
+
+// text with &, <, > and quotes escaped.
+void ep_write_escaped(FILE *out, const char *text);
+
+#endif
