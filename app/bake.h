@@ -18,6 +18,7 @@ typedef struct ep_pose_quality {
   double inverted_before, inverted_tets, crushed_before, crushed_tets;
   double worst_before, worst_volume_ratio; // smallest volume of a tet over that at rest
   double repair_moved, repair_moved_most;  // rms and largest move by the repair / diagonal
+  double repair_share;                     // rms move by the repair / rms displacement of the pose
   double repair_shift;                     // of the low coefficients by the repair, relative
 } ep_pose_quality;
 

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "app/bake.h"
+#include "app/landmarks.h"
 #include "app/map_store.h"
 
 // ---- LB spaces -------------------------------------------------------------------------------
@@ -88,12 +89,19 @@ static ep_status read_regions(const ep_bake *bake, int family, ep_regions *out, 
 static ep_status compute_map(ep_bake *bake, ep_bake_step *step, ep_map *map, ep_error *err) {
   const ep_stage *stage = step->stage;
   ep_regions regions = {0};
+  const ep_family *family = &bake->scene->family[stage->family];
+  ep_landmark landmark[EP_LANDMARKS_MAX];
   ep_map_options options = ep_default_map_options();
   options.m = stage->functions;
   options.same_family = stage->same_family;
+  options.reflections = family->reflections;
+  options.keep_frame = family->frame == EP_FRAME_AUTHORED;
+  options.landmark = landmark;
+  EP_TRY(ep_landmarks_of_map(bake->scene, bake->shapes, stage->family, stage->from, stage->to,
+                             landmark, &options.landmarks, err));
   EP_TRY(ep_bake_lb(bake, stage->from, err));
   EP_TRY(ep_bake_lb(bake, stage->to, err));
-  if (bake->scene->family[stage->family].regions) {
+  if (family->regions) {
     EP_TRY(read_regions(bake, stage->family, &regions, err));
     options.regions = &regions;
     options.from_column = region_column(bake, stage->family, stage->from);

@@ -10,6 +10,9 @@
 // A pose whose fixed vertices stray further than this share of the diagonal does not hold still
 // what the scene holds: beyond the first figure a warning, beyond the second an error.
 static const double shift_doubtful = 0.02, shift_refused = 0.2;
+// A repair that moves the object by this share of what the pose itself does (rms) has made another
+// pose of it. Real poses: below 0.01; a mirrored one, which is turned inside out again: 2.
+static const double share_doubtful = 0.1, share_refused = 0.5;
 
 static ep_status no_memory(ep_error *err) {
   return ep_fail(err, EP_ERR_MEMORY, "no memory for the example poses");
@@ -108,9 +111,24 @@ static ep_status judge(const ep_bake *bake, const ep_stage *stage, const ep_map 
   return EP_OK;
 }
 
+// Regions the rest of the map contradicts, by number: the file is to be corrected even where the
+// map is good without them.
+static void warn_of_suspects(const ep_bake *bake, const ep_stage *stage, const ep_map_quality *q) {
+  char list[240] = "";
+  size_t used = 0;
+  for (int i = 0; q->region && i < q->regions && used + 40 < sizeof list; i++)
+    if (q->region[i].suspect)
+      used += (size_t)snprintf(list + used, sizeof list - used, "%s%d (fits %d)", used ? ", " : "",
+                               i + 1, q->region[i].best_match + 1);
+  if (used)
+    ep_warn(bake->log, "%s: regions that do not belong together, left out: %s; check %s",
+            stage->name, list, bake->scene->family[stage->family].regions);
+}
+
 static ep_status get_map(ep_bake *bake, int from, int to, const ep_map **out, ep_error *err) {
   ep_stage *stage = ep_plan_map(bake->plan, from, to);
   EP_TRY(ep_bake_map(bake, stage, out, err));
+  warn_of_suspects(bake, stage, &(*out)->quality);
   return judge(bake, stage, *out, err);
 }
 
@@ -228,6 +246,19 @@ static ep_status report_tets(const ep_bake *bake, int index, ep_error *err) {
              q->inverted_tets, q->inverted_before, q->worst_volume_ratio);
     return complain(bake, index, err, text);
   }
+  if (q->repair_share > share_refused) {
+    snprintf(text, sizeof text,
+             "%.0f tets are inverted on the object's mesh, and their repair moves it by %.2g of "
+             "what the pose does: that is another pose. Is the example a mirror image? Look at it "
+             "with 'eigenpose align'",
+             q->inverted_before, q->repair_share);
+    return complain(bake, index, err, text);
+  }
+  if (q->repair_share > share_doubtful)
+    ep_warn(bake->log,
+            "example %s: %.0f inverted tets repaired, which moved the object by %.2g of what the "
+            "pose does",
+            name, q->inverted_before, q->repair_share);
   if (q->crushed_tets > 0)
     ep_warn(bake->log,
             "example %s: %.0f tets stay crushed (smallest volume %.2g of rest); they cannot serve "
@@ -261,6 +292,7 @@ static ep_status repair_pose(ep_bake *bake, const ep_pose_source *example,
   quality->worst_volume_ratio = report.worst_after;
   quality->repair_moved = report.moved;
   quality->repair_moved_most = report.moved_most;
+  quality->repair_share = report.moved_share;
   quality->repair_shift = report.coefficient_shift;
   return EP_OK;
 }

@@ -14,6 +14,7 @@ static ep_status command_bake(const ep_cli *cli, ep_session *session, ep_bake *b
                               ep_error *err) {
   char path[EP_PATH_MAX];
   EP_TRY(ep_bake_model(bake, path, err));
+  EP_TRY(ep_bake_poses(bake, err)); // for the report: a model in the cache does not ask for them
   if (cli->json)
     return ep_report_print(json_pack("{s:s, s:s, s:o, s:o}", "scene", session->scene.name, "model",
                                      path, "stages", ep_report_stages(&session->plan), "examples",

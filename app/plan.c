@@ -6,11 +6,12 @@
 #include <string.h>
 
 #include "app/hash_text.h"
+#include "app/landmarks.h"
 
 // Raised whenever a stage computes something else from the same input: old results are then not
 // found any more.
 static const int stage_version[] = {
-    [EP_STAGE_EIGEN] = 1, [EP_STAGE_MAP] = 2,    [EP_STAGE_POSES] = 2,    [EP_STAGE_MODES] = 1,
+    [EP_STAGE_EIGEN] = 1, [EP_STAGE_MAP] = 2,    [EP_STAGE_POSES] = 3,    [EP_STAGE_MODES] = 1,
     [EP_STAGE_PATHS] = 1, [EP_STAGE_BASIS] = 1,  [EP_STAGE_CUBATURE] = 1, [EP_STAGE_GREEN] = 1,
     [EP_STAGE_MODEL] = 2, [EP_STAGE_TARGET] = 1,
 };
@@ -76,9 +77,16 @@ static bool any_map(const ep_shapes *shapes) {
 
 // ---- LB spaces -------------------------------------------------------------------------------
 
+// Poses need reduction.eigenfunctions, maps those of their family.
+static int most_functions(const ep_scene *scene) {
+  int most = scene->eigenfunctions;
+  for (int i = 0; i < scene->nfamilies; i++) most = larger(most, scene->family[i].eigenfunctions);
+  return most;
+}
+
 static void plan_eigen(planner *p) {
   const ep_shapes *shapes = p->shapes;
-  const int m = p->scene->eigenfunctions;
+  const int m = any_map(shapes) ? most_functions(p->scene) : p->scene->eigenfunctions;
   if (!shapes->examples) {
     add(p, EP_STAGE_EIGEN, NULL, false, "no examples: no Laplace-Beltrami space is needed");
     return;
@@ -106,12 +114,12 @@ static void plan_eigen(planner *p) {
 }
 
 static ep_status check_functions(const planner *p) {
-  const int m = p->scene->eigenfunctions;
+  const int m = any_map(p->shapes) ? most_functions(p->scene) : p->scene->eigenfunctions;
   for (int i = 0; i < p->plan->count; i++) {
     const ep_stage *stage = &p->plan->stage[i];
     if (stage->kind == EP_STAGE_EIGEN && stage->runs && stage->functions < m)
       return ep_fail(p->err, EP_ERR_SCENE,
-                     "%s: reduction.eigenfunctions is %d, but %s (%d vertices) has only %d",
+                     "%s: %d eigenfunctions are asked for, but %s (%d vertices) has only %d",
                      p->scene->path, m, p->shapes->shape[stage->shape].mesh.name,
                      p->shapes->shape[stage->shape].mesh.nv, stage->functions);
   }
@@ -120,20 +128,39 @@ static ep_status check_functions(const planner *p) {
 
 // ---- maps ------------------------------------------------------------------------------------
 
+static ep_status add_landmarks(const planner *p, int family, int from, int to, ep_hash_text *text) {
+  ep_landmark landmark[EP_LANDMARKS_MAX];
+  int count;
+  EP_TRY(ep_landmarks_of_map(p->scene, p->shapes, family, from, to, landmark, &count, p->err));
+  for (int i = 0; i < count; i++) {
+    const ep_landmark *l = &landmark[i];
+    ep_hash_add(text, "landmark %d %d %.17g %.17g %.17g %.17g %.17g %.17g", l->from_vertex,
+                l->to_vertex, l->from[0], l->from[1], l->from[2], l->to[0], l->to[1], l->to[2]);
+  }
+  return EP_OK;
+}
+
+static const char *how(const ep_family *f) {
+  if (f->regions && f->landmarks) return "by the given regions and landmarks";
+  if (f->regions) return "by the given regions";
+  return f->landmarks ? "by the given landmarks" : "automatic";
+}
+
 static ep_status plan_map(planner *p, int family, int from, int to, const char *why) {
   if (ep_plan_map(p->plan, from, to)) return EP_OK;
   const ep_family *f = &p->scene->family[family];
   const ep_shape_file *target = &p->shapes->shape[to], *source = &p->shapes->shape[from];
-  ep_stage *stage = add(p, EP_STAGE_MAP, target->name, true, "%s, %s", why,
-                        f->regions ? "by the given regions" : "automatic");
+  ep_stage *stage = add(p, EP_STAGE_MAP, target->name, true, "%s, %s", why, how(f));
   stage->from = from;
   stage->to = to;
   stage->family = family;
   stage->same_family = to != p->shapes->rest[family];
-  stage->functions = p->scene->eigenfunctions;
+  stage->functions = f->eigenfunctions;
   ep_hash_text text = key_of(stage->kind);
-  ep_hash_add(&text, "%s %s m=%d same=%d", source->geometry.hex, target->geometry.hex,
-              stage->functions, (int)stage->same_family);
+  ep_hash_add(&text, "%s %s m=%d same=%d frame=%d reflections=%d", source->geometry.hex,
+              target->geometry.hex, stage->functions, (int)stage->same_family, (int)f->frame,
+              (int)f->reflections);
+  EP_TRY(add_landmarks(p, family, from, to, &text));
   ep_hash_add(&text, "%s %s", ep_plan_eigen(p->plan, from)->key.hex,
               ep_plan_eigen(p->plan, to)->key.hex);
   if (f->regions) {

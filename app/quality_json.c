@@ -160,6 +160,7 @@ json_t *ep_pose_json(const ep_pose_quality *q) {
       {"worst_volume_ratio_before_repair", q->worst_before},
       {"repair_moved", q->repair_moved},
       {"repair_moved_most", q->repair_moved_most},
+      {"repair_share", q->repair_share},
       {"repair_coefficient_shift", q->repair_shift},
       {"coefficient_error", q->coefficient_error},
       {"fixed_shift", q->fixed_shift},

@@ -130,6 +130,56 @@ static ep_status read_fixed(const reader *r, const raw_scene *raw, ep_scene *out
   return EP_OK;
 }
 
+// A place of a landmark on one shape: a vertex, a point, or nothing.
+static ep_status mark(const reader *r, const char *key, const double *vertex, const double *point,
+                      ep_mark *out) {
+  if (vertex && point) return bad(r, key, "give a vertex or a point, not both");
+  out->given = vertex || point;
+  if (point) return vector(r, key, point, out->at);
+  return vertex ? whole(r, key, vertex, 0, 1, 2147483647, &out->vertex) : EP_OK;
+}
+
+static ep_status read_landmark(const reader *r, const char *key, const raw_landmark *raw,
+                               const ep_family *family, ep_scene_landmark *out) {
+  char part[112];
+  EP_TRY(mark(r, key, raw->object, raw->object_at, &out->object));
+  EP_TRY(mark(r, key, raw->rest, raw->rest_at, &out->rest));
+  if (out->rest.given && !family->rest)
+    return bad(r, key, "the family has no rest shape of its own; give object and poses");
+  if (out->object.given + out->rest.given + (raw->poses_count > 0) < 2)
+    return bad(r, key, "name the place on two shapes: object, rest (or object_at, rest_at), poses");
+  if (raw->poses_count && (int)raw->poses_count != family->poses)
+    return bad(r, key, "poses lists %u vertices, but the family has %d poses; give one for each",
+               raw->poses_count, family->poses);
+  out->pose = calloc(raw->poses_count + 1, sizeof *out->pose);
+  if (!out->pose) return no_memory(r);
+  out->poses = (int)raw->poses_count;
+  for (unsigned i = 0; i < raw->poses_count; i++) {
+    snprintf(part, sizeof part, "%.90s.poses.%u", key, i);
+    EP_TRY(mark(r, part, &raw->poses[i], NULL, &out->pose[i]));
+  }
+  return EP_OK;
+}
+
+static ep_status read_map(const reader *r, unsigned index, const raw_map *raw, ep_family *out) {
+  char key[64];
+  out->accept = raw->accept && *raw->accept;
+  out->reflections = raw->reflections && *raw->reflections;
+  if (raw->frame) out->frame = (ep_map_frame)*raw->frame;
+  snprintf(key, sizeof key, "families.%u.map.eigenfunctions", index);
+  if (raw->eigenfunctions)
+    EP_TRY(whole(r, key, raw->eigenfunctions, 0, 1, 200, &out->eigenfunctions));
+  out->landmark = calloc(raw->landmarks_count + 1, sizeof *out->landmark);
+  if (!out->landmark) return no_memory(r);
+  for (unsigned i = 0; i < raw->landmarks_count; i++) {
+    snprintf(key, sizeof key, "families.%u.map.landmarks.%u", index, i);
+    out->landmarks++;
+    EP_TRY(read_landmark(r, key, &raw->landmarks[i], out, &out->landmark[i]));
+  }
+  snprintf(key, sizeof key, "families.%u.map.regions", index);
+  return raw->regions ? file(r, key, raw->regions, &out->regions) : EP_OK;
+}
+
 static ep_status read_family(const reader *r, unsigned index, const raw_family *raw,
                              ep_family *out) {
   char key[64], fallback[32];
@@ -153,10 +203,7 @@ static ep_status read_family(const reader *r, unsigned index, const raw_family *
     EP_TRY(
         selection(r, key, raw->region->box, raw->region->plane, raw->region->file, &out->region));
   }
-  if (!raw->map) return EP_OK;
-  out->accept = raw->map->accept && *raw->map->accept;
-  snprintf(key, sizeof key, "families.%u.map.regions", index);
-  return raw->map->regions ? file(r, key, raw->map->regions, &out->regions) : EP_OK;
+  return raw->map ? read_map(r, index, raw->map, out) : EP_OK;
 }
 
 static ep_status read_families(const reader *r, const raw_scene *raw, ep_scene *out) {
@@ -196,6 +243,8 @@ static ep_status read_reduction(const reader *r, const raw_reduction *given, ep_
     EP_TRY(whole(r, key, wholes[i].value, wholes[i].fallback, wholes[i].low, wholes[i].high,
                  wholes[i].out));
   }
+  for (int i = 0; i < out->nfamilies; i++)
+    if (!out->family[i].eigenfunctions) out->family[i].eigenfunctions = out->eigenfunctions;
   EP_TRY(number(r, "reduction.amplitude", raw->amplitude, 0.2, 1e-4, 2, &out->amplitude));
   const int examples = ep_scene_examples(out);
   if (examples > out->modes)
@@ -473,6 +522,8 @@ void ep_scene_free(ep_scene *scene) {
     free(family->name);
     free(family->rest);
     free(family->regions);
+    for (int j = 0; j < family->landmarks; j++) free(family->landmark[j].pose);
+    free(family->landmark);
     free(family->region.path);
   }
   free(scene->fixed);

@@ -23,13 +23,32 @@ typedef struct ep_selection {
   char key[64];      // where it stands in the scene, for messages
 } ep_selection;
 
+typedef enum ep_map_frame { EP_FRAME_AUTOMATIC, EP_FRAME_AUTHORED } ep_map_frame;
+// Where a landmark is on one shape: a vertex of the file (from 1), or a point where vertex is 0;
+// or not given.
+typedef struct ep_mark {
+  bool given;
+  int vertex;
+  double at[3];
+} ep_mark;
+typedef struct ep_scene_landmark {
+  ep_mark object, rest;
+  int poses;
+  ep_mark *pose; // (poses)
+} ep_scene_landmark;
+
 typedef struct ep_family {
   char *name;
   char *rest; // NULL: poses are of the object's own rest shape
   int poses;
   char **pose;   // (poses)
   char *regions; // NULL: automatic map
-  bool accept;   // go on with a bad map
+  int landmarks;
+  ep_scene_landmark *landmark;
+  ep_map_frame frame;
+  bool reflections;   // mirrored frames are tried too
+  int eigenfunctions; // of its maps
+  bool accept;        // go on with a bad map
   bool has_region;
   ep_selection region; // vertices where the poses act (Green-strain path); else everywhere
 } ep_family;

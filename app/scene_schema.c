@@ -85,8 +85,27 @@ static const cyaml_schema_field_t object_fields[] = {
     CYAML_FIELD_END,
 };
 
+static const cyaml_strval_t frame_names[] = {
+    {"automatic", EP_FRAME_AUTOMATIC},
+    {"authored", EP_FRAME_AUTHORED},
+};
+static const cyaml_schema_field_t landmark_fields[] = {
+    NUMBER(raw_landmark, object),
+    NUMBER(raw_landmark, rest),
+    CYAML_FIELD_SEQUENCE("object_at", OPTIONAL, raw_landmark, object_at, &number, 3, 3),
+    CYAML_FIELD_SEQUENCE("rest_at", OPTIONAL, raw_landmark, rest_at, &number, 3, 3),
+    CYAML_FIELD_SEQUENCE("poses", OPTIONAL, raw_landmark, poses, &number, 1, 64),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_value_t landmark = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, raw_landmark, landmark_fields)};
 static const cyaml_schema_field_t map_fields[] = {
     TEXT(raw_map, regions),
+    CYAML_FIELD_SEQUENCE("landmarks", OPTIONAL, raw_map, landmarks, &landmark, 0, 64),
+    CYAML_FIELD_ENUM_PTR("frame", OPTIONAL | CYAML_FLAG_STRICT, raw_map, frame, frame_names,
+                         CYAML_ARRAY_LEN(frame_names)),
+    NUMBER(raw_map, eigenfunctions),
+    CYAML_FIELD_BOOL_PTR("reflections", OPTIONAL, raw_map, reflections),
     CYAML_FIELD_BOOL_PTR("accept", OPTIONAL, raw_map, accept),
     CYAML_FIELD_END,
 };

@@ -26,9 +26,20 @@ typedef struct raw_object {
   char *mesh;
   raw_material *material;
 } raw_object;
+typedef struct raw_landmark {
+  double *object, *rest;       // vertices
+  double *object_at, *rest_at; // points (3)
+  unsigned object_at_count, rest_at_count;
+  double *poses; // vertices
+  unsigned poses_count;
+} raw_landmark;
 typedef struct raw_map {
   char *regions;
-  bool *accept;
+  raw_landmark *landmarks;
+  unsigned landmarks_count;
+  int *frame;
+  double *eigenfunctions;
+  bool *reflections, *accept;
 } raw_map;
 typedef struct raw_family {
   char *name, *rest;

@@ -78,6 +78,7 @@ typedef struct ep_repair_report {
   int crushed_before, crushed_after;   // volume < floor, inverted ones counted too
   double worst_before, worst_after;    // smallest deformed / rest volume
   double moved, moved_most; // rms (by volume) and largest move of a vertex over the diagonal
+  double moved_share;       // rms move over the rms displacement of the pose itself
   double coefficient_shift; // |Phi^T M (u - u0)| / |Phi^T M u0| over the first m; 0 where m is 0
   int iterations;
 } ep_repair_report;

@@ -279,15 +279,18 @@ static void count_tets(const repair *r, int *inverted, int *crushed, double *wor
 static void measure_move(repair *r, ep_repair_report *report) {
   const ep_pose_solver *s = &r->solver;
   const double diagonal = ep_mesh_diagonal(r->mesh);
-  double sum = 0, volume = 0, most = 0;
+  double sum = 0, volume = 0, most = 0, pose = 0;
   for (int v = 0; v < r->mesh->nv; v++) {
     const double *d = r->delta + 3 * (size_t)v, square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     sum += s->vertex_volume[v] * square;
+    const double *u = r->u0 + 3 * (size_t)v;
+    pose += s->vertex_volume[v] * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
     volume += s->vertex_volume[v];
     most = fmax(most, square);
   }
   report->moved = sqrt(sum / volume) / diagonal;
   report->moved_most = sqrt(most) / diagonal;
+  report->moved_share = sqrt(sum / pose); // a pose with inverted tets is not at rest: pose > 0
   double shift = 0, size = 0;
   ep_pose_coefficients(s, r->delta, r->coefficients);
   for (int i = 0; i < 3 * s->m; i++) shift += r->coefficients[i] * r->coefficients[i];

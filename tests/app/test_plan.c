@@ -177,6 +177,10 @@ static void a_change_reaches_only_what_depends_on_it(void **state) {
   assert_int_equal(changed_by(text, "families.0.map.accept=true"), POSES | PATHS | late);
   assert_int_equal(changed_by(text, "families.0.map.regions=regions.ini"),
                    MAP | POSES | PATHS | late);
+  assert_int_equal(changed_by(text, "families.0.map.landmarks=[{object: 1, rest: 1}]"),
+                   MAP | POSES | PATHS | late);
+  assert_int_equal(changed_by(text, "families.0.map.frame=authored"), MAP | POSES | PATHS | late);
+  assert_int_equal(changed_by(text, "families.0.map.eigenfunctions=3"), MAP | POSES | PATHS | late);
   assert_int_equal(changed_by(text, "object.mesh=finer.veg"),
                    EIGEN | MAP | POSES | MODES | PATHS | late);
 }

@@ -59,7 +59,9 @@ static void everything_is_read(void **state) {
       "object:\n  mesh: box.veg\n"
       "  material: {model: neohookean, density: 900, young: 2e5, poisson: 0.3}\n"
       "fixed:\n  - plane: {point: [0, 0, 0], normal: [1, 0, 0]}\n  - file: held.txt\n"
-      "families:\n  - name: own\n    poses: [box.veg, box.veg]\n    map: {accept: true}\n"
+      "families:\n  - name: own\n    poses: [box.veg, box.veg]\n    map: {accept: true,\n"
+      "    frame: authored, eigenfunctions: 6, landmarks: [{object: 3, poses: [4, 5]},\n"
+      "    {object_at: [0, 0.5, 1], poses: [6, 7]}]}\n"
       "reduction: {modes: 12, amplitude: 0.1}\n"
       "simulation: {dt: 0.01, steps: 5, damping: {mass: 0.2}}\n"
       "examples: {strength: 0.5, force: linear, solver: newton}\n"
@@ -75,7 +77,13 @@ static void everything_is_read(void **state) {
   assert_int_equal(s.fixed[0].kind, EP_SELECT_PLANE);
   assert_int_equal(s.fixed[1].kind, EP_SELECT_FILE);
   assert_int_equal(ep_scene_examples(&s), 2);
-  assert_true(s.family[0].accept && !s.family[0].rest);
+  assert_true(s.family[0].accept && !s.family[0].rest && !s.family[0].reflections);
+  assert_true(s.family[0].frame == EP_FRAME_AUTHORED && s.family[0].eigenfunctions == 6);
+  assert_int_equal(s.family[0].landmarks, 2);
+  const ep_scene_landmark *l = s.family[0].landmark;
+  assert_true(l[0].object.given && l[0].object.vertex == 3 && !l[0].rest.given);
+  assert_true(l[0].poses == 2 && l[0].pose[1].vertex == 5);
+  assert_true(l[1].object.given && l[1].object.vertex == 0 && l[1].object.at[1] == 0.5);
   assert_int_equal(s.force, EP_EXAMPLE_LINEAR);
   assert_int_equal(s.solver, EP_SOLVER_NEWTON);
   assert_true(s.load[0].gravity && s.load[0].vector[1] == -9.81);
@@ -123,6 +131,17 @@ static void mistakes_are_named_with_their_place(void **state) {
           "s.yaml:3:48", "another family");
   refused(HEAD "families: [{poses: [box.veg, box.veg]}]\nreduction: {modes: 1}\n", "s.yaml:4:20",
           "2 examples");
+#define MAP "families: [{rest: box.veg, poses: [box.veg], map: {"
+  refused(HEAD MAP "landmarks: [{object: 1}]}}]\n", "s.yaml:3", "two shapes");
+  refused(HEAD MAP "landmarks: [{object: 0, rest: 1}]}}]\n", "s.yaml:3", "out of range");
+  refused(HEAD MAP "landmarks: [{object: 1, object_at: [0, 0, 0], rest: 1}]}}]\n", "s.yaml:3",
+          "not both");
+  refused(HEAD MAP "landmarks: [{object: 1, poses: [1, 2]}]}}]\n", "s.yaml:3", "one for each");
+  refused(HEAD MAP "landmarks: [{object: 1, rest_at: [0, 0]}]}}]\n", "s.yaml:3", "rest_at");
+  refused(HEAD MAP "frame: sideways}}]\n", "s.yaml:3", "sideways");
+  refused(HEAD MAP "eigenfunctions: 0}}]\n", "s.yaml:3", "out of range");
+  refused(HEAD "families: [{poses: [box.veg], map: {landmarks: [{rest: 1, object: 1}]}}]\n",
+          "s.yaml:3", "no rest shape");
   refused(HEAD "loads: [{gravity: [0, 0, 1], push: {file: held.txt, force: [0, 0, 1]}}]\n",
           "s.yaml:3:9", "one of gravity, push");
   refused(HEAD "loads: [{push: {file: held.txt, force: [0, 0, 1], from: 2, until: 1}}]\n",
