@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "base/status.h"
+#include "reduced/cubic.h"
 #include "reduced/integrator.h"
 #include "reduced/material.h"
 #include "reduced/model_arrays.h"
@@ -20,6 +21,7 @@ extern "C" {
 
 typedef int32_t ep_model_int32; // "int32" of the array list
 typedef double ep_model_double;
+typedef float ep_model_float;
 
 typedef struct ep_model_sizes {
 #define X(name) int name;
@@ -27,11 +29,24 @@ typedef struct ep_model_sizes {
 #undef X
 } ep_model_sizes;
 
+// How the elastic energy of a step is evaluated: by cubature (any material), or exactly by cubic
+// polynomials (StVK; reduced/cubic.h) in doubles or floats. With EP_STVK_VOLUME the polynomial
+// carries the penalty of the cubature elements beside it. Floats: residuals below 1e-5 are
+// round-off.
+typedef enum ep_evaluator {
+  EP_EVALUATE_CUBATURE,
+  EP_EVALUATE_CUBIC,
+  EP_EVALUATE_CUBIC_FLOAT
+} ep_evaluator;
+
 // All arrays are borrowed from the bytes the model was opened in (or from a baker's memory).
 typedef struct ep_model {
   ep_model_sizes size;
   ep_material material; // constitutive law at the cubature elements
-  double rest_scale;    // diagonal of the rest bounding box [length]
+  // The exact one where the model has it (double before float). May be set to another the model has
+  // the arrays of, before states are made.
+  ep_evaluator evaluator;
+  double rest_scale; // diagonal of the rest bounding box [length]
 #define X(type, name, d1, d2, d3) const ep_model_##type *name;
   EP_MODEL_ARRAYS(X)
 #undef X
@@ -69,9 +84,9 @@ const double *ep_state_target(const ep_state *state);  // (r) target configurati
 
 // ---- energies --------------------------------------------------------------------------------
 // (Not ep_elastic: that is the type of material constants in mesh/mesh.h.)
-// Elastic energy of the model at q by cubature; f (r) = dW/dq and stiffness k (r x r, symmetric,
-// both triangles) unless NULL. project != 0: element tangents projected to positive semidefinite.
-// Uses the state's scratch, changes nothing else.
+// Elastic energy of the model at q by its evaluator; f (r) = dW/dq and stiffness k (r x r,
+// symmetric, both triangles) unless NULL. project != 0: element tangents projected to positive
+// semidefinite. Uses the state's scratch, changes nothing else.
 double ep_elastic_energy(ep_state *state, const double *q, double *f, double *k, int project);
 
 // Energy of deforming the examples, weighted by w (k), into configuration q:
@@ -106,8 +121,9 @@ ep_status ep_target_newton(void *user, ep_state *state, const double *w, double 
                            double tolerance, ep_target_report *report);
 
 // ---- Green-strain example potential ----------------------------------------------------------
-// The potential W_a of Zhang et al. 2015 (eq. 8 to 10), W_StVK + alpha W_a >= 0 for alpha <= 1, with
-// the weights of the examples explicit in q (reduced/green.c). A model has it where size.greens > 0.
+// The potential W_a of Zhang et al. 2015 (eq. 8 to 10), W_StVK + alpha W_a >= 0 for alpha <= 1,
+// with the weights of the examples explicit in q (reduced/green.c). A model has it where
+// size.greens > 0.
 typedef struct ep_green {
   double alpha;        // share of the examples, 0 (none) to 1 (no resistance along the examples)
   double sum_to_one;   // weak constraints on the weights: quadratic penalties in units of the
@@ -126,17 +142,17 @@ const double *ep_state_green_weights(const ep_state *state);
 typedef enum ep_example_force { EP_EXAMPLE_ENERGY, EP_EXAMPLE_LINEAR } ep_example_force;
 
 typedef struct ep_step_def {
-  int cookie;                     // set by ep_default_step; a def made otherwise is refused
-  ep_integrator integrator;       // EP_IMPLICIT_EULER
-  double dt;                      // [s]
-  const double *force;            // (r) generalised external force U^T f, or NULL
-  double damping_mass;            // Rayleigh alpha [1/s]
-  double damping_stiffness;       // Rayleigh beta [s], against K0
-  double strength;                // example strength; 1: as stiff as the material itself; 0: none
-  double relief;                  // share of the material's own energy left out while an example
-                                  // force acts, 0 (default) to 1: the object then yields along the
-                                  // examples (stiffness 1 - relief) and keeps 1 - relief + strength
-                                  // across them (Zhang et al. 2015 eq. 3 has relief = strength)
+  int cookie;               // set by ep_default_step; a def made otherwise is refused
+  ep_integrator integrator; // EP_IMPLICIT_EULER
+  double dt;                // [s]
+  const double *force;      // (r) generalised external force U^T f, or NULL
+  double damping_mass;      // Rayleigh alpha [1/s]
+  double damping_stiffness; // Rayleigh beta [s], against K0
+  double strength;          // example strength; 1: as stiff as the material itself; 0: none
+  double relief;            // share of the material's own energy left out while an example
+                            // force acts, 0 (default) to 1: the object then yields along the
+                            // examples (stiffness 1 - relief) and keeps 1 - relief + strength
+                            // across them (Zhang et al. 2015 eq. 3 has relief = strength)
   ep_green green; // Green-strain potential (alpha 0: none). StVK: W + alpha W_a; another material:
                   // (1 - alpha) W + alpha (W_StVK with volume penalty + W_a)
   ep_example_force example_force; // energy (target as undeformed shape) or strength K0 (q_t - q)

@@ -8,8 +8,9 @@ double ep_evaluate(ep_state *state, int terms, const double *q, double *f, doubl
   return ep_evaluate_law(state, state->model->material, terms, q, f, k, project);
 }
 
-double ep_evaluate_law(ep_state *state, ep_material material, int terms, const double *q, double *f,
-                       double *k, int project) {
+// Into padded_f and padded_k.
+static void run_kernel(ep_state *state, ep_material material, int terms, const double *q,
+                       int want_f, int want_k, int project) {
   const ep_model *m = state->model;
   const int r = m->size.r;
   memcpy(state->padded_q, q, (size_t)r * sizeof *q); // its tail stays zero
@@ -23,11 +24,18 @@ double ep_evaluate_law(ep_state *state, ep_material material, int terms, const d
                          .terms = terms,
                          .term = state->term,
                          .q = state->padded_q,
-                         .f = f ? state->padded_f : NULL,
-                         .k = k ? state->padded_k : NULL,
+                         .f = want_f ? state->padded_f : NULL,
+                         .k = want_k ? state->padded_k : NULL,
                          .project = project,
                          .scratch = state->kernel_scratch};
   state->kernel(&task);
+}
+
+double ep_evaluate_law(ep_state *state, ep_material material, int terms, const double *q, double *f,
+                       double *k, int project) {
+  const ep_model *m = state->model;
+  const int r = m->size.r;
+  run_kernel(state, material, terms, q, f != NULL, k != NULL, project);
   if (f) memcpy(f, state->padded_f, (size_t)r * sizeof *f);
   for (int i = 0; k && i < r; i++)
     memcpy(k + (size_t)i * (size_t)r, state->padded_k + (size_t)i * 8 * (size_t)m->size.blocks,
@@ -37,7 +45,47 @@ double ep_evaluate_law(ep_state *state, ep_material material, int terms, const d
   return energy;
 }
 
+// At the last point the Hessian is there already (the gradient was wanted before).
+static double evaluate_cubic(ep_state *state, const double *q) {
+  const size_t bytes = (size_t)state->model->size.r * sizeof *q;
+  if (state->cubic_known && memcmp(q, state->cubic_at, bytes) == 0) return state->cubic_energy;
+  memcpy(state->cubic_at, q, bytes);
+  state->cubic_energy =
+      ep_cubic_evaluate(&state->cubic, q, state->cubic_f, state->cubic_k, state->cubic_scratch);
+  state->cubic_known = 1;
+  return state->cubic_energy;
+}
+
+static double add_penalty(ep_state *state, double scale, const double *q, double *f, double *h,
+                          int project) {
+  const ep_model *m = state->model;
+  const int r = m->size.r, width = 8 * m->size.blocks;
+  state->term[0] = (ep_kernel_term){.scale = scale, .weight = m->cubature_w};
+  run_kernel(state, EP_VOLUME_PENALTY, 1, q, f != NULL, h != NULL, project);
+  if (state->term[0].energy == 0) return 0;
+  for (int a = 0; f && a < r; a++) f[a] += state->padded_f[a];
+  for (int a = 0; h && a < r; a++)
+    for (int b = 0; b < r; b++) h[a * r + b] += state->padded_k[a * width + b];
+  return state->term[0].energy;
+}
+
+double ep_cubic_add(ep_state *state, double scale, const double *q, double *f, double *h,
+                    int project) {
+  const int r = state->model->size.r;
+  const double energy = scale * evaluate_cubic(state, q);
+  for (int a = 0; f && a < r; a++) f[a] += scale * state->cubic_f[a];
+  for (int i = 0; h && i < r * r; i++) h[i] += scale * state->cubic_k[i];
+  if (state->model->material != EP_STVK_VOLUME) return energy;
+  return energy + add_penalty(state, scale, q, f, h, project);
+}
+
 double ep_elastic_energy(ep_state *state, const double *q, double *f, double *k, int project) {
+  const size_t r = (size_t)state->model->size.r;
+  if (state->model->evaluator != EP_EVALUATE_CUBATURE) {
+    if (f) memset(f, 0, r * sizeof *f);
+    if (k) memset(k, 0, r * r * sizeof *k);
+    return ep_cubic_add(state, 1, q, f, k, project);
+  }
   state->term[0] = (ep_kernel_term){.scale = 1, .weight = state->model->cubature_w};
   return ep_evaluate(state, 1, q, f, k, project);
 }

@@ -8,6 +8,9 @@
 
 enum { EP_LANES = 8 };
 
+// A law of the kernels beside those of ep_material: the penalty of EP_STVK_VOLUME alone.
+#define EP_VOLUME_PENALTY EP_MATERIALS
+
 // One energy: scale * sum_j weight_j psi(F_j(q) inverse_j).
 typedef struct ep_kernel_term {
   double scale;

@@ -194,6 +194,8 @@ void EP_KERNEL(ep_kernel_task *t) {
   for (int first = 0; first < t->s; first += EP_LANES) {
     lane f[9], stress[9];
     deformation_gradients(t, first, f);
+    // One check while nothing collapses (lanes beyond s are at rest).
+    if (t->material == EP_VOLUME_PENALTY && !lane_any(lane_crushed(f))) continue;
     for (int c = 0; c < 9; c++) stress[c] = lane_all(0);
     for (int c = 0; tangent && c < 81; c++) tangent[c] = lane_all(0);
     for (int i = 0; i < t->terms; i++) {

@@ -75,6 +75,29 @@ LANE_INLINE void lane_stvk_tangent(lane lambda, lane mu, const lane f[9], const 
   }
 }
 
+LANE_INLINE lane_mask lane_crushed(const lane f[9]) {
+  return lane_determinant(f) < lane_all(0.5);
+}
+
+// psi, p and h with k/2 min(0, J - 0.5)^2 and its derivatives added.
+LANE_INLINE lane lane_add_penalty(lane psi, lane lambda, lane mu, const lane f[9], lane *p,
+                                  lane *h) {
+  const lane half = lane_all(0.5);
+  const lane_mask crushed = lane_crushed(f);
+  if (!lane_any(crushed)) return psi; // one comparison while nothing collapses
+  const lane stiff = lane_select(lambda > mu, lambda, mu) * lane_all(10), zero = lane_all(0);
+  const lane gap = lane_select(crushed, lane_determinant(f) - half, zero);
+  psi += half * stiff * gap * gap;
+  if (!p) return psi;
+  lane c[9];
+  lane_cofactor(f, c);
+  for (int i = 0; i < 9; i++) p[i] += stiff * gap * c[i];
+  if (!h) return psi;
+  lane_add_outer(lane_select(crushed, stiff, zero), c, h);
+  lane_add_cofactor_derivative(stiff * gap, f, h);
+  return psi;
+}
+
 LANE_INLINE lane lane_stvk(int volume, lane lambda, lane mu, const lane f[9], lane *p, lane *h) {
   lane e[6], s[6];
   lane_green_strain(f, e);
@@ -89,20 +112,14 @@ LANE_INLINE lane lane_stvk(int volume, lane lambda, lane mu, const lane f[9], la
                        f[3 * i + 2] * s[sym_index[6 + j]];
   }
   if (p && h) lane_stvk_tangent(lambda, mu, f, s, h);
-  if (!volume) return psi;
-  const lane_mask crushed = lane_determinant(f) < half;
-  if (!lane_any(crushed)) return psi; // one comparison while nothing collapses
-  const lane stiff = lane_select(lambda > mu, lambda, mu) * lane_all(10), zero = lane_all(0);
-  const lane gap = lane_select(crushed, lane_determinant(f) - half, zero);
-  psi += half * stiff * gap * gap;
-  if (!p) return psi;
-  lane c[9];
-  lane_cofactor(f, c);
-  for (int i = 0; i < 9; i++) p[i] += stiff * gap * c[i];
-  if (!h) return psi;
-  lane_add_outer(lane_select(crushed, stiff, zero), c, h);
-  lane_add_cofactor_derivative(stiff * gap, f, h);
-  return psi;
+  return volume ? lane_add_penalty(psi, lambda, mu, f, p, h) : psi;
+}
+
+// The volume penalty alone, beside a polynomial that holds the rest.
+LANE_INLINE lane lane_penalty(lane lambda, lane mu, const lane f[9], lane *p, lane *h) {
+  for (int i = 0; p && i < 9; i++) p[i] = lane_all(0);
+  for (int i = 0; h && i < 81; i++) h[i] = lane_all(0);
+  return lane_add_penalty(lane_all(0), lambda, mu, f, p, h);
 }
 
 // ---- stable neo-Hookean ------------------------------------------------------------------------
@@ -171,6 +188,7 @@ LANE_INLINE lane lane_corotational(lane lambda, lane mu, const lane f[9], lane *
 
 LANE_INLINE lane lane_material(ep_material model, lane lambda, lane mu, const lane f[9], lane *p,
                                lane *h) {
+  if (model == EP_VOLUME_PENALTY) return lane_penalty(lambda, mu, f, p, h);
   if (model == EP_STABLE_NEOHOOKEAN) return lane_neohookean(lambda, mu, f, p, h);
   if (model == EP_COROTATIONAL) return lane_corotational(lambda, mu, f, p, h);
   return lane_stvk(model == EP_STVK_VOLUME, lambda, mu, f, p, h);

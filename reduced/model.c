@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "reduced/eigenpose.h"
+#include "reduced/state.h"
 #include "reduced/tensorfile.h"
 #include "reduced/text.h"
 
@@ -76,8 +77,16 @@ static ep_status read_sizes(const ep_tensorfile *file, ep_model_sizes *z, char *
   }
   EP_MODEL_SIZES(ONE)
 #undef ONE
-  if (z->r < 1 || z->r > MAX_MODES || z->s < 1 || z->n < 1 || z->nt < 1)
-    return ep_text_refuse(message, "impossible sizes: r, s, n and nt must be at least 1");
+  if (z->r < 1 || z->r > MAX_MODES || z->n < 1 || z->nt < 1)
+    return ep_text_refuse(message, "impossible sizes: r, n and nt must be at least 1");
+  if ((z->cubic || z->cubic_float) && z->r > EP_CUBIC_MAX_MODES)
+    return ep_text_refuse(message, "impossible sizes: too many modes for the cubic path");
+  if ((z->cubic && (size_t)z->cubic != ep_cubic_stream_size(z->r, EP_DOUBLE)) ||
+      (z->cubic_float && (size_t)z->cubic_float != ep_cubic_stream_size(z->r, EP_FLOAT)))
+    return ep_text_refuse(message, "the cubic coefficients are not those of r modes");
+  if (z->s < 1 && (z->m > 0 || !(z->cubic || z->cubic_float)))
+    return ep_text_refuse(message, "impossible sizes: without cubature elements (s = 0) there must "
+                                   "be cubic coefficients and no descriptors");
   if (z->blocks != (z->r + 7) / 8) return ep_text_refuse(message, "blocks is not ceil(r / 8)");
   if (z->k > MAX_EXAMPLES || z->m > z->n || (z->k > 0 && z->m < 1 && z->greens < 1))
     return ep_text_refuse(message, "impossible sizes: k examples need descriptors, 1 <= m <= n, or "
@@ -123,6 +132,17 @@ static ep_status check_finite(const char *name, const double *x, size_t count, c
   return EP_OK;
 }
 
+static ep_status check_finite_floats(const char *name, const float *x, size_t count,
+                                     char *message) {
+  for (size_t i = 0; i < count; i++)
+    if (!isfinite(x[i])) {
+      refuse_array(message, name, "not finite at element ");
+      ep_text_add_number(message, (long long)i);
+      return EP_ERR_FORMAT;
+    }
+  return EP_OK;
+}
+
 static ep_status check_at_least_zero(const char *name, const double *x, int count, char *message) {
   for (int i = 0; i < count; i++)
     if (!(x[i] >= 0)) return refuse_array(message, name, "holds a negative number");
@@ -146,18 +166,25 @@ static ep_status check_index(const char *name, const int32_t *x, int64_t count, 
 static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *message) {
   const int n = model->size.n, nt = model->size.nt, r = model->size.r, m = model->size.m;
   const int k = model->size.k, s = model->size.s, blocks = model->size.blocks;
-  const int greens = model->size.greens;
+  const int greens = model->size.greens, cubic = model->size.cubic;
+  const int cubic_float = model->size.cubic_float;
   const void *data;
 #define DTYPE_double EP_F64
 #define DTYPE_int32  EP_I32
+#define DTYPE_float  EP_F32
 #define ONE(type, name, d1, d2, d3)                                                                \
   FIRST_FAILURE(find_array(file, #name, DTYPE_##type, d1, d2, d3, &data, message));                \
   model->name = data;                                                                              \
   if (DTYPE_##type == EP_F64)                                                                      \
-    FIRST_FAILURE(check_finite(#name, data, (size_t)(d1) * (size_t)(d2) * (size_t)(d3), message));
+    FIRST_FAILURE(check_finite(#name, data, (size_t)(d1) * (size_t)(d2) * (size_t)(d3), message)); \
+  if (DTYPE_##type == EP_F32)                                                                      \
+    FIRST_FAILURE(                                                                                 \
+        check_finite_floats(#name, data, (size_t)(d1) * (size_t)(d2) * (size_t)(d3), message));
   EP_MODEL_ARRAYS(ONE)
 #undef ONE
   FIRST_FAILURE(check_index("tets", model->tets, 4 * (int64_t)nt, n, message));
+  FIRST_FAILURE(check_at_least_zero("cubic_scales", model->cubic_scales,
+                                    cubic > 0 || cubic_float > 0 ? 3 : 0, message));
   FIRST_FAILURE(check_index("cubature_tet", model->cubature_tet, s, nt, message));
   FIRST_FAILURE(check_at_least_zero("cubature_w", model->cubature_w, s, message));
   FIRST_FAILURE(check_at_least_zero("cubature_lambda", model->cubature_lambda, s, message));
@@ -177,6 +204,27 @@ static ep_status read_scale(const ep_tensorfile *file, double *scale, char *mess
   return EP_OK;
 }
 
+ep_evaluator ep_model_best_evaluator(const ep_model *model) {
+  if (model->size.cubic) return EP_EVALUATE_CUBIC;
+  return model->size.cubic_float ? EP_EVALUATE_CUBIC_FLOAT : EP_EVALUATE_CUBATURE;
+}
+
+ep_status ep_model_check_evaluator(const ep_model *model, char *message) {
+  const int stvk = model->material == EP_STVK || model->material == EP_STVK_VOLUME;
+  if (model->evaluator == EP_EVALUATE_CUBATURE && model->size.s < 1)
+    return ep_text_refuse(message, "the model has no cubature elements");
+  if (model->evaluator == EP_EVALUATE_CUBIC && !model->size.cubic)
+    return ep_text_refuse(message, "the model has no cubic coefficients in doubles");
+  if (model->evaluator == EP_EVALUATE_CUBIC_FLOAT && !model->size.cubic_float)
+    return ep_text_refuse(message, "the model has no cubic coefficients in floats");
+  if (model->evaluator != EP_EVALUATE_CUBATURE && !stvk)
+    return ep_text_refuse(message, "cubic coefficients with a material other than stvk");
+  if (model->evaluator != EP_EVALUATE_CUBATURE && model->material == EP_STVK_VOLUME &&
+      model->size.s < 1)
+    return ep_text_refuse(message, "the volume penalty needs cubature elements");
+  return EP_OK;
+}
+
 static ep_status open_model(const void *bytes, size_t size, ep_model *model, char *message) {
   ep_tensorfile file;
   if ((uintptr_t)bytes % 64) {
@@ -188,7 +236,9 @@ static ep_status open_model(const void *bytes, size_t size, ep_model *model, cha
   FIRST_FAILURE(read_material(&file, &model->material, message));
   FIRST_FAILURE(read_sizes(&file, &model->size, message));
   FIRST_FAILURE(read_scale(&file, &model->rest_scale, message));
-  return read_arrays(&file, model, message);
+  FIRST_FAILURE(read_arrays(&file, model, message));
+  model->evaluator = ep_model_best_evaluator(model);
+  return ep_model_check_evaluator(model, message);
 }
 
 ep_status ep_model_open(const void *bytes, size_t size, ep_model *model, char *message) {

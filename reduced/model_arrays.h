@@ -1,15 +1,16 @@
 // The arrays of a model, one list: it drives what is in the struct, saved, loaded and checked.
-//   X(type, name, dimension 1, dimension 2, dimension 3)      type: double or int32 (int)
+//   X(type, name, dimension 1, dimension 2, dimension 3)      type: double, float or int32 (int)
 // Dimensions are members of ep_model_sizes (or literals). Arrays whose product is 0 are absent.
 //
 //   sizes: n vertices, nt tets, r modes, m LB functions of the descriptor (the constant one
 //   included for constrained objects; 0 where no descriptors are used), k examples, s cubature
 //   elements, blocks = ceil(r / 8): groups of 8 modes, greens independent strains of the examples
-//   (Green-strain path; 0: not used).
+//   (Green-strain path; 0: not used), cubic and cubic_float reals of the cubic path's streams (0:
+//   not used; then without interpolation s may be 0).
 #ifndef EP_REDUCED_MODEL_ARRAYS_H
 #define EP_REDUCED_MODEL_ARRAYS_H
 
-#define EP_MODEL_SIZES(X) X(n) X(nt) X(r) X(m) X(k) X(s) X(blocks) X(greens)
+#define EP_MODEL_SIZES(X) X(n) X(nt) X(r) X(m) X(k) X(s) X(blocks) X(greens) X(cubic) X(cubic_float)
 
 // clang-format off
 #define EP_MODEL_ARRAYS(X)                                                                        \
@@ -43,7 +44,12 @@
   X(double, green_linear,  greens, blocks, 8)                                                     \
   X(double, green_weights, k, greens, 1)                                                          \
   X(double, green_energy,  greens ? k : 0, 1, 1)                                                  \
-  X(double, green_scale,   greens ? 1 : 0, 1, 1)
+  X(double, green_scale,   greens ? 1 : 0, 1, 1)                                                  \
+  /* exact StVK energy over all elements as one quartic form (reduced/cubic.h), in doubles, in */ \
+  /* floats; sums over all elements: largest |G_e|_F, energy and force at unit strain */          \
+  X(double, cubic_stream,  cubic, 1, 1)                                                           \
+  X(float,  cubic_stream_float, cubic_float, 1, 1)                                                \
+  X(double, cubic_scales,  cubic > 0 || cubic_float > 0 ? 3 : 0, 1, 1)
 // clang-format on
 
 #endif

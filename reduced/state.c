@@ -9,12 +9,20 @@ static size_t rounded(size_t bytes) {
   return (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
 }
 
+static ep_precision precision_of(const ep_model *model) {
+  return model->evaluator == EP_EVALUATE_CUBIC_FLOAT ? EP_FLOAT : EP_DOUBLE;
+}
+
 // Set the pointers into memory (NULL: only count). Returns the bytes used.
 static size_t lay_out(const ep_model *model, char *memory, ep_state *state) {
   const size_t r = (size_t)model->size.r, m = (size_t)model->size.m, k = (size_t)model->size.k;
   const size_t s = (size_t)model->size.s, width = 8 * (size_t)model->size.blocks;
   const size_t greens = (size_t)model->size.greens;
   const size_t examples = k > 0 && m > 0; // without descriptors their scratch is left out
+  const size_t cubic_words =
+      model->evaluator == EP_EVALUATE_CUBATURE
+          ? 0
+          : ep_cubic_scratch(model->size.r, precision_of(model)) / sizeof(double);
   size_t used = rounded(sizeof *state);
   if (memory) state->term = (ep_kernel_term *)(memory + used);
   used += rounded((k + 2) * sizeof *state->term);
@@ -43,10 +51,15 @@ static void measure_scales(ep_state *state) {
     state->energy_scale += stiffness;
     state->force_scale += stiffness * norm;
   }
+  if (!m->cubic_scales) return; // of all elements, where they are known
+  state->strain_scale = m->cubic_scales[0];
+  state->energy_scale = m->cubic_scales[1];
+  state->force_scale = m->cubic_scales[2];
 }
 
 ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_state **out) {
   *out = NULL;
+  if (ep_model_check_evaluator(model, NULL) != EP_OK) return EP_ERR_ARGUMENT;
   if (!memory || (uintptr_t)memory % ALIGNMENT || bytes < ep_state_bytes(model))
     return EP_ERR_ARGUMENT;
   memset(memory, 0, ep_state_bytes(model));
@@ -56,6 +69,13 @@ ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_st
   state->kernel = ep_kernel_select(&state->isa);
   state->green_kernel = ep_green_select();
   state->w[0] = 1;
+  state->energy_noise = 1e-13;
+  const int narrow = model->evaluator == EP_EVALUATE_CUBIC_FLOAT;
+  if (narrow) state->energy_noise = 2e-6, state->force_noise = 1e-5;
+  const void *stream = narrow ? (const void *)model->cubic_stream_float : model->cubic_stream;
+  if (model->evaluator != EP_EVALUATE_CUBATURE &&
+      ep_cubic_open(model->size.r, precision_of(model), stream, &state->cubic) != EP_OK)
+    return EP_ERR_ARGUMENT;
   measure_scales(state);
   if (!ep_cholesky(model->size.r, model->k0, state->k0_factor)) return EP_ERR_NUMERIC;
   *out = state;

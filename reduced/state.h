@@ -43,6 +43,10 @@
   X(next_w, k + 1)         /* interpolation under way: kept only when the step succeeds */        \
   X(next_target, r)                                                                               \
   X(work, r)                                                                                      \
+  X(cubic_scratch, cubic_words)  /* cubic path: scratch, and what it gave last */                  \
+  X(cubic_at, cubic_words ? r : 0)                                                                \
+  X(cubic_f, cubic_words ? r : 0)                                                                 \
+  X(cubic_k, cubic_words ? r * r : 0)                                                             \
   X(green_y0, greens)      /* Green-strain path (reduced/green.c) */                              \
   X(green_y, greens)                                                                              \
   X(green_last, greens)                                                                           \
@@ -61,16 +65,25 @@ struct ep_state {
   ep_kernel kernel;
   ep_green_kernel green_kernel;
   const char *isa;
-  ep_kernel_term *term; // (k + 2) terms of one evaluation
-  double energy_scale;  // sum_j w_j (lambda + 2 mu): energy at unit strain
-  double force_scale;   // sum_j w_j (lambda + 2 mu) |G_j|: generalised force at unit strain
-  double strain_scale;  // max_j |G_j|_F: strain by a unit q
-  int has_target;       // a target was found before
-  double dt_before;     // of the last step; 0: none, or q or v was written since
+  ep_cubic cubic;      // where the model's evaluator is cubic
+  double cubic_energy; // at cubic_at, where cubic_known
+  int cubic_known;
+  double energy_noise, force_noise; // relative round-off of energies and residuals
+  ep_kernel_term *term;             // (k + 2) terms of one evaluation
+  double energy_scale;              // sum_j w_j (lambda + 2 mu): energy at unit strain
+  double force_scale;  // sum_j w_j (lambda + 2 mu) |G_j|: generalised force at unit strain
+  double strain_scale; // max_j |G_j|_F: strain by a unit q
+  int has_target;      // a target was found before
+  double dt_before;    // of the last step; 0: none, or q or v was written since
 #define X(name, count) double *name;
   EP_STATE_ARRAYS(X)
 #undef X
 };
+
+// (reduced/model.c) The evaluator a model should use; EP_ERR_FORMAT and why where it lacks the
+// arrays.
+ep_evaluator ep_model_best_evaluator(const ep_model *model);
+ep_status ep_model_check_evaluator(const ep_model *model, char *message);
 
 // Evaluate the first `terms` of state->term at q: sum of the energies (each in its term), f (r) and
 // k (r x r) unless NULL.
@@ -78,6 +91,13 @@ double ep_evaluate(ep_state *state, int terms, const double *q, double *f, doubl
 // The same with another law than the model's.
 double ep_evaluate_law(ep_state *state, ep_material material, int terms, const double *q, double *f,
                        double *k, int project);
+
+// scale W by cubic polynomials, with the volume penalty where the material has it: its gradient and
+// Hessian are added to f and h unless NULL. Only where the model's evaluator is cubic. Uses
+// term[0]. The last result is kept: a gradient and then the Hessian at one point cost one
+// evaluation.
+double ep_cubic_add(ep_state *state, double scale, const double *q, double *f, double *h,
+                    int project);
 
 // What the examples' strains add to (1 - alpha or 1) W (eigenpose.h): alpha W_a, for a law other
 // than StVK alpha (W_StVK + W_a), W_StVK with the volume penalty; added to f and h unless NULL.

@@ -57,15 +57,18 @@ static double inner_energy(step *s, const double *x, double *g, double *h, int p
   ep_state *state = s->state;
   const ep_step_def *def = s->def;
   const int as_energy = s->examples && def->example_force == EP_EXAMPLE_ENERGY;
-  state->term[0] = (ep_kernel_term){.scale = ep_green_share(state->model, &def->green) *
-                                             (s->examples ? 1 - def->relief : 1),
-                                    .weight = state->model->cubature_w};
+  const int by_cubature = state->model->evaluator == EP_EVALUATE_CUBATURE;
+  const double share =
+      ep_green_share(state->model, &def->green) * (s->examples ? 1 - def->relief : 1);
+  int terms = 0;
+  if (by_cubature)
+    state->term[terms++] = (ep_kernel_term){.scale = share, .weight = state->model->cubature_w};
   if (as_energy)
-    state->term[1] = (ep_kernel_term){
+    state->term[terms++] = (ep_kernel_term){
         .scale = def->strength, .inverse = state->target_inverse, .weight = state->target_weight};
-  ep_evaluate(state, 1 + as_energy, x, g, h, project);
-  s->elastic = state->term[0].energy;
-  s->pull = as_energy ? state->term[1].energy : 0;
+  ep_evaluate(state, terms, x, g, h, project);
+  s->pull = as_energy ? state->term[terms - 1].energy : 0;
+  s->elastic = by_cubature ? state->term[0].energy : ep_cubic_add(state, share, x, g, h, project);
   if (s->examples && !as_energy)
     s->pull = 0.5 * def->strength * add_k0(s, def->strength, x, state->next_target, g);
   s->strains = ep_green_potential(state, &def->green, x, g, h, project);
@@ -172,7 +175,7 @@ ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *repor
   ep_newton newton = {.energy = energy,
                       .residual = residual,
                       .user = &s,
-                      .tolerance = def->tolerance,
+                      .tolerance = fmax(def->tolerance, state->force_noise),
                       .max_iterations = def->max_iterations};
   predict(&s);
   choose_start(&s);

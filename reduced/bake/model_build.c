@@ -1,6 +1,7 @@
 #include "reduced/bake/model_build.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -23,7 +24,12 @@ static ep_status check_parts(const ep_model_parts *p, ep_error *err) {
   if (p->basis->n != p->fem->mesh->nv)
     return ep_fail(err, EP_ERR_ARGUMENT, "the basis is of another mesh (%d vertices, not %d)",
                    p->basis->n, p->fem->mesh->nv);
-  if (p->s < 1) return ep_fail(err, EP_ERR_ARGUMENT, "a model needs cubature elements");
+  const bool penalty = p->fem->model == EP_STVK_VOLUME;
+  if (p->s < 1 && (!p->cubic || p->m > 0 || penalty))
+    return ep_fail(err, EP_ERR_ARGUMENT, "a model needs cubature elements%s",
+                   !p->cubic ? ""
+                   : penalty ? " for the volume penalty"
+                             : " for its examples");
   if (p->m < 0 || (p->m > 0 && (!p->lb || !p->lb_mass)))
     return ep_fail(err, EP_ERR_ARGUMENT, "descriptors need the Laplace-Beltrami space");
   if (p->m > 0 && (p->lb->m < p->m || p->lb->n != p->basis->n || p->lb_mass->n != p->basis->n))
@@ -50,8 +56,9 @@ static ep_status check_parts(const ep_model_parts *p, ep_error *err) {
 static ep_status allocate(builder *b, ep_model_memory *out, ep_error *err) {
   const ep_model_sizes *z = &b->size;
   int n = z->n, nt = z->nt, r = z->r, m = z->m, k = z->k, s = z->s, blocks = z->blocks;
-  int greens = z->greens;
-  (void)n, (void)nt, (void)r, (void)m, (void)k, (void)s, (void)blocks, (void)greens;
+  int greens = z->greens, cubic = z->cubic, cubic_float = z->cubic_float;
+  (void)n, (void)nt, (void)r, (void)m, (void)k, (void)s, (void)blocks, (void)greens, (void)cubic,
+      (void)cubic_float;
 #define X(type, name, d1, d2, d3)                                                                  \
   if ((size_t)(d1) * (size_t)(d2) * (size_t)(d3) > 0) {                                            \
     size_t bytes = (size_t)(d1) * (size_t)(d2) * (size_t)(d3) * sizeof *b->a.name;                 \
@@ -161,6 +168,7 @@ static void fill_cubature(builder *b, double *g) {
 }
 
 static ep_status build_cubature(builder *b, ep_error *err) {
+  if (b->size.s == 0) return EP_OK;
   double *g = malloc((size_t)b->size.s * 9 * (size_t)b->size.r * sizeof *g);
   if (!g) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d cubature elements", b->size.s);
   fill_cubature(b, g);
@@ -184,6 +192,39 @@ static void fill_green(builder *b) {
   for (int i = 0; i < k; i++) b->a.green_scale[0] += green->energy[i] / k;
 }
 
+// The stream, and what a state measures strains and forces by.
+static ep_status fill_cubic(builder *b, ep_error *err) {
+  const ep_model_parts *p = b->parts;
+  const int r = b->size.r;
+  const ep_status status = p->precision == EP_DOUBLE
+                               ? ep_cubic_pack(r, p->cubic, b->a.cubic_stream)
+                               : ep_cubic_pack_float(r, p->cubic, b->a.cubic_stream_float);
+  if (status != EP_OK)
+    return ep_fail(err, status,
+                   "the cubic coefficients of %d modes do not fit %s: use double precision, or "
+                   "other units",
+                   r, p->precision == EP_DOUBLE ? "doubles" : "floats");
+  double *g = malloc(9 * (size_t)r * sizeof *g);
+  if (!g) return ep_fail(err, EP_ERR_MEMORY, "no memory for the scales of the model");
+  for (int e = 0; e < b->size.nt; e++) {
+    double square = 0;
+    element_gradient(b, e, g);
+    for (int i = 0; i < 9 * r; i++) square += g[i] * g[i];
+    const double norm = sqrt(square);
+    const double stiffness = p->fem->volume[e] * (p->fem->lambda[e] + 2 * p->fem->mu[e]);
+    b->a.cubic_scales[0] = fmax(b->a.cubic_scales[0], norm);
+    b->a.cubic_scales[1] += stiffness;
+    b->a.cubic_scales[2] += stiffness * norm;
+  }
+  free(g);
+  return EP_OK;
+}
+
+static int cubic_size(const ep_model_parts *p, ep_precision precision) {
+  return p->cubic && p->precision == precision ? (int)ep_cubic_stream_size(p->basis->r, precision)
+                                               : 0;
+}
+
 static ep_model_sizes sizes_of(const ep_model_parts *p) {
   const int constants = p->m > 0 && p->fem->nheld > 0 ? 1 : 0;
   return (ep_model_sizes){.n = p->fem->mesh->nv,
@@ -193,7 +234,9 @@ static ep_model_sizes sizes_of(const ep_model_parts *p) {
                           .k = p->basis->examples,
                           .s = p->s,
                           .blocks = (p->basis->r + 7) / 8,
-                          .greens = p->green ? p->green->count : 0};
+                          .greens = p->green ? p->green->count : 0,
+                          .cubic = cubic_size(p, EP_DOUBLE),
+                          .cubic_float = cubic_size(p, EP_FLOAT)};
 }
 
 ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_error *err) {
@@ -206,12 +249,16 @@ ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_e
   if (b.size.m > 0) EP_TRY_GOTO(status, build_descriptors(&b, err), fail);
   EP_TRY_GOTO(status, build_cubature(&b, err), fail);
   fill_green(&b);
+  if (parts->cubic) EP_TRY_GOTO(status, fill_cubic(&b, err), fail);
   out->model.size = b.size;
   out->model.material = parts->fem->model;
   out->model.rest_scale = ep_mesh_diagonal(parts->fem->mesh);
 #define X(type, name, d1, d2, d3) out->model.name = b.a.name;
   EP_MODEL_ARRAYS(X)
 #undef X
+  out->model.evaluator = !parts->cubic                   ? EP_EVALUATE_CUBATURE
+                         : parts->precision == EP_DOUBLE ? EP_EVALUATE_CUBIC
+                                                         : EP_EVALUATE_CUBIC_FLOAT;
   return EP_OK;
 fail:
   ep_model_memory_free(out);

@@ -11,13 +11,15 @@
 typedef struct ep_model_parts {
   const ep_fem *fem;
   const ep_basis *basis;
-  int m;                 // LB eigenfunctions of the descriptor; 0 without examples
-  const ep_lb *lb;       // lb->m >= m; NULL where m == 0
-  const ep_csr *lb_mass; // (n) plain volume mass; NULL where m == 0
-  int s;                 // cubature elements
-  const int *tet;        // (s) element numbers
-  const double *weight;  // (s) absolute volumes, >= 0
+  int m;                              // LB eigenfunctions of the descriptor; 0 without examples
+  const ep_lb *lb;                    // lb->m >= m; NULL where m == 0
+  const ep_csr *lb_mass;              // (n) plain volume mass; NULL where m == 0
+  int s;                              // cubature elements
+  const int *tet;                     // (s) element numbers
+  const double *weight;               // (s) absolute volumes, >= 0
   const ep_green_coefficients *green; // of the Green-strain path, NULL: not used
+  const double *cubic;                // (ep_cubic_count(r)) exact StVK coefficients, NULL: not used
+  ep_precision precision;             // of the cubic stream in the model
 } ep_model_parts;
 
 // A model with memory of its own; nothing of the parts is kept.

@@ -183,6 +183,7 @@ static int model_tensors(const ep_model *model, ep_tensor *out) {
   int count = 0;
 #define DTYPE_double EP_F64
 #define DTYPE_int32  EP_I32
+#define DTYPE_float  EP_F32
 #define SIZES(name)  const int64_t name = z->name;
 #define ARRAY(type, array, d1, d2, d3)                                                             \
   if ((int64_t)(d1) * (d2) * (d3) > 0)                                                             \
