@@ -46,7 +46,7 @@ static ep_status compute(ep_bake *bake, ep_bake_step *step, ep_error *err) {
   if (status == EP_OK) status = region_shares(bake, &share, err);
   if (status == EP_OK)
     status =
-        ep_green_coefficients_compute(&bake->fem, &bake->basis, weight, share, bake->log, g, err);
+        ep_green_coefficients_compute(&bake->fem, &bake->basis, NULL, weight, share, bake->log, g, err);
   free(weight);
   free(share);
   if (status != EP_OK) return status;

@@ -101,17 +101,21 @@ static void poses_of(const ep_basis *basis, double *poses) {
 }
 
 ep_status ep_green_coefficients_compute(const ep_fem *fem, const ep_basis *basis,
-                                        const double *weight, const double *share, ep_log *log,
+                                        const double *poses, const double *weight,
+                                        const double *share, ep_log *log,
                                         ep_green_coefficients *out, ep_error *err) {
   ep_green_space space = {0};
   workspace w = {0};
   *out = (ep_green_coefficients){0};
-  double *poses = malloc(((size_t)basis->examples * 3 * (size_t)basis->n + 1) * sizeof *poses);
-  if (!poses) return no_memory(err);
-  poses_of(basis, poses);
-  ep_status status =
-      ep_green_space_create(fem, weight, basis->examples, poses, share, log, &space, err);
-  free(poses);
+  double *own = NULL;
+  if (!poses) {
+    own = malloc(((size_t)basis->examples * 3 * (size_t)basis->n + 1) * sizeof *own);
+    if (!own) return no_memory(err);
+    poses_of(basis, own);
+  }
+  ep_status status = ep_green_space_create(fem, weight, basis->examples, poses ? poses : own, share,
+                                           log, &space, err);
+  free(own);
   if (status == EP_OK) status = allocate(&space, basis, out, err);
   if (status == EP_OK) status = workspace_make(fem, basis->r, &w, err);
   if (status == EP_OK) ep_progress_begin(log, "Green-strain coefficients", space.k);

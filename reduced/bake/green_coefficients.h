@@ -18,9 +18,12 @@ typedef struct ep_green_coefficients {
   double *energy;  // (k) strain energy of each example [J]
 } ep_green_coefficients;
 
-// Coefficients of the basis' own examples (poses U q_i). weight, share: as in green_strains.h.
+// Coefficients of the basis' own examples: poses NULL for U q_i as the basis holds them, or the
+// poses themselves (basis->examples x 3n) where they are not in its span. weight, share: as in
+// green_strains.h.
 ep_status ep_green_coefficients_compute(const ep_fem *fem, const ep_basis *basis,
-                                        const double *weight, const double *share, ep_log *log,
+                                        const double *poses, const double *weight,
+                                        const double *share, ep_log *log,
                                         ep_green_coefficients *out, ep_error *err);
 void ep_green_coefficients_free(ep_green_coefficients *coefficients);
 

@@ -375,7 +375,7 @@ static void coefficients_equal_full_space(void **state) {
     for (size_t e = 0; e < nt; e++) weight[e] = !few ? s.b.fem.volume[e] : e % 7 ? 0 : 0.01;
     ep_green_coefficients c;
     ep_green_full full;
-    ASSERT_OK(ep_green_coefficients_compute(&s.b.fem, &basis, weight, NULL, NULL, &c, err));
+    ASSERT_OK(ep_green_coefficients_compute(&s.b.fem, &basis, NULL, weight, NULL, NULL, &c, err));
     ASSERT_OK(ep_green_full_create(&s.b.fem, weight, K, poses, NULL, NULL, &full, err));
     assert_int_equal(c.count, K);
     double q[R], y[K], w[K], reduced[K], gradient[R] = {0}, along, size = 0;
