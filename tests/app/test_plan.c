@@ -99,6 +99,49 @@ static void choices_of_the_scene_leave_stages_out(void **state) {
   drop(&p);
 }
 
+// The Green-strain path: explicit weights, so no interpolation; the object's own connectivity needs
+// no LB space at all, another one the spaces of the transfer.
+static void green_path_leaves_descriptors_out(void **state) {
+  (void)state;
+  static const char own[] = OBJECT FIXED SMALL "families: [{poses: [bent.veg]}]\n";
+  static const char other[] = OBJECT FIXED SMALL "families: [{rest: other.veg, poses: "
+                                                 "[other-bent.veg]}]\n";
+  static const struct {
+    const char *text, *set;
+    int eigen, maps, green, target;
+  } cases[] = {{own, "examples.path=green", 0, 0, 1, 0},
+               {own, "examples.path=both", 1, 0, 1, 1},
+               {own, "examples.path=lb", 1, 0, 0, 1},
+               {other, "examples.path=green", 2, 1, 1, 0},
+               {other, "examples.path=both", 2, 1, 1, 1}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    planned p = plan_of(cases[i].text, cases[i].set);
+    assert_int_equal(running(&p, EP_STAGE_EIGEN), cases[i].eigen);
+    assert_int_equal(running(&p, EP_STAGE_MAP), cases[i].maps);
+    assert_int_equal(running(&p, EP_STAGE_GREEN), cases[i].green);
+    assert_int_equal(running(&p, EP_STAGE_TARGET), cases[i].target);
+    assert_int_equal(running(&p, EP_STAGE_PATHS), 1);
+    drop(&p);
+  }
+}
+
+// A region changes the coefficients and the model made of them, and nothing else.
+static void a_region_changes_the_coefficients_only(void **state) {
+  (void)state;
+  planned a =
+      plan_of(OBJECT FIXED SMALL "families: [{poses: [bent.veg]}]\n", "examples.path=green");
+  planned b = plan_of(OBJECT FIXED SMALL "families: [{poses: [bent.veg], region: {box: {low: [0.3, "
+                                         "-9, -9], high: [9, 9, 9]}}}]\n",
+                      "examples.path=green");
+  for (int i = 0; i < a.plan.count; i++) {
+    const ep_stage *x = &a.plan.stage[i], *y = &b.plan.stage[i];
+    const int expected = x->kind == EP_STAGE_GREEN || x->kind == EP_STAGE_MODEL;
+    assert_int_equal(strcmp(x->key.hex, y->key.hex) != 0, expected);
+  }
+  drop(&a);
+  drop(&b);
+}
+
 static void impossible_scenes_are_refused(void **state) {
   (void)state;
   planned p;
@@ -203,6 +246,8 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(what_is_not_needed_is_left_out),
       cmocka_unit_test(choices_of_the_scene_leave_stages_out),
+      cmocka_unit_test(green_path_leaves_descriptors_out),
+      cmocka_unit_test(a_region_changes_the_coefficients_only),
       cmocka_unit_test(impossible_scenes_are_refused),
       cmocka_unit_test(a_change_reaches_only_what_depends_on_it),
   };

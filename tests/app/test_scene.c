@@ -52,6 +52,30 @@ static void defaults_are_filled_in(void **state) {
   ep_scene_free(&s);
 }
 
+static void green_strain_keys(void **state) {
+  (void)state;
+  ep_scene s;
+  ep_error err;
+  assert_int_equal(parse_with(HEAD "examples: {path: green, alpha: 0.75, constraints: {sum_to_one: "
+                                   "2, non_negative: 3}, strength: 1}\n",
+                              0, NULL, &s, &err),
+                   EP_OK);
+  assert_int_equal(s.methods, EP_METHOD_GREEN);
+  assert_true(s.green.alpha == 0.75 && s.green.sum_to_one == 2 && s.green.non_negative == 3);
+  ep_scene_free(&s);
+  // the same keys with the other path: alpha is off, so that --set can switch
+  assert_int_equal(parse_with(HEAD "examples: {path: lb, alpha: 0.75}\n", 0, NULL, &s, &err),
+                   EP_OK);
+  assert_true(s.methods == EP_METHOD_LB && s.green.alpha == 0);
+  ep_scene_free(&s);
+  refused(HEAD "examples: {path: green, alpha: 1.5}\n", "s.yaml:3:", "examples.alpha");
+  refused(HEAD "examples: {path: green, constraints: {non_negative: -1}}\n",
+          "s.yaml:3:", "non_negative");
+  refused(HEAD "examples: {path: blue}\n", "s.yaml:3:", "path");
+  refused(HEAD "families: [{poses: [box.veg], region: {box: {low: [0, 0, 0], high: [1, 1, 1]}}}]\n",
+          "s.yaml:3:", "examples.path: green");
+}
+
 static void everything_is_read(void **state) {
   (void)state;
   static const char text[] =
@@ -220,6 +244,7 @@ static int set_up(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(defaults_are_filled_in),
+      cmocka_unit_test(green_strain_keys),
       cmocka_unit_test(everything_is_read),
       cmocka_unit_test(json_is_a_scene_too),
       cmocka_unit_test(mistakes_are_named_with_their_place),
