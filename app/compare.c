@@ -43,6 +43,7 @@ static bool is_stvk(ep_material m) {
 // All points of one material, r and time step.
 static void add_reduced(ep_comparison *c, const ep_sweep *s, ep_point point) {
   const int solvers = c->examples ? s->nsolvers : 1;
+  const int elements = c->scene->elements < c->tets ? c->scene->elements : c->tets - 1;
   for (int i = 0; i < solvers; i++) {
     point.solver = c->examples ? s->solver[i] : "";
     point.method = EP_METHOD_CUBATURE;
@@ -51,8 +52,13 @@ static void add_reduced(ep_comparison *c, const ep_sweep *s, ep_point point) {
       if (point.s < c->tets) add(c, point);
     }
     point.method = EP_METHOD_CUBIC;
-    point.s = 0;
-    if (wants(s, EP_METHOD_CUBIC) && is_stvk(point.material)) add(c, point);
+    // The interpolation and the penalty stay with elements, as many as the scene has.
+    point.s = c->examples || point.material == EP_STVK_VOLUME ? elements : 0;
+    for (int j = 0; j < s->nprecisions && is_stvk(point.material); j++) {
+      point.precision = (ep_precision)s->precision[j];
+      if (wants(s, EP_METHOD_CUBIC)) add(c, point);
+    }
+    point.precision = EP_DOUBLE;
     point.method = EP_METHOD_ALL;
     point.s = c->tets;
     if (wants(s, EP_METHOD_ALL)) add(c, point);
@@ -101,9 +107,9 @@ static ep_digest point_key(const sweep *w, const ep_bench *bench, const ep_point
                            const char *what) {
   const ep_sweep *s = &w->session->scene.sweep;
   char kind[256];
-  snprintf(kind, sizeof kind, "%s %s s %d dt %.17g solver %s reference %s r %d dt %.17g", what,
-           ep_method_name(p->method), p->s, p->dt, p->solver, ep_method_name(s->reference),
-           s->modes[s->nmodes - 1], s->dt[s->ndt - 1]);
+  snprintf(kind, sizeof kind, "%s %s %d s %d dt %.17g solver %s reference %s r %d dt %.17g", what,
+           ep_method_name(p->method), (int)p->precision, p->s, p->dt, p->solver,
+           ep_method_name(s->reference), s->modes[s->nmodes - 1], s->dt[s->ndt - 1]);
   return ep_bench_key(bench, kind, &w->shape);
 }
 

@@ -30,7 +30,8 @@
 typedef struct ep_point {
   ep_method method;
   ep_material material;
-  int r, s;           // s: elements used, 0 for cubic and full
+  int r, s; // s: elements used (cubic: for examples and penalty alone), 0 for full
+  ep_precision precision;
   double dt;          // [s]
   const char *solver; // of the interpolation; "" without examples. Borrowed
   bool cached, failed;
@@ -81,9 +82,10 @@ ep_status ep_bench_prepare(ep_bench *bench, ep_error *err);
 void ep_bench_close(ep_bench *bench);
 // A name for results of this bench, its scene's simulation and what `kind` says.
 ep_digest ep_bench_key(const ep_bench *bench, const char *kind, const ep_frames *frames);
-// A model with all elements (s = 0) or the cubature `c`; free with ep_model_memory_free.
-ep_status ep_bench_model(ep_bench *bench, const ep_cubature *c, ep_model_memory *out,
-                         ep_error *err);
+// A model with the cubature `c` or all elements (NULL), and the polynomials `cubic` (packed, in
+// `precision`) unless NULL; free with ep_model_memory_free.
+ep_status ep_bench_model(ep_bench *bench, const ep_cubature *c, const double *cubic,
+                         ep_precision precision, ep_model_memory *out, ep_error *err);
 
 // ---- points ------------------------------------------------------------------------------------
 // Simulate in the full space with point->dt; fills frames and what is measured of the run itself.
@@ -93,6 +95,8 @@ ep_status ep_compare_reduced(ep_bench *bench, ep_point *point, ep_frames *frames
 // Errors of a run against the reference, into point.
 ep_status ep_compare_errors(const ep_frames *run, const ep_frames *reference, double diagonal,
                             ep_point *point, ep_error *err);
+
+const char *ep_precision_name(ep_precision precision); // "double", "float"
 
 // ---- what comes of it --------------------------------------------------------------------------
 // The fastest point below the scene's budgets, or -1; why (256) says how it was chosen.

@@ -94,9 +94,9 @@ ep_digest ep_bench_key(const ep_bench *bench, const char *kind, const ep_frames 
   ep_hash_add(&text, "%s", ep_plan_find(&bench->plan, EP_STAGE_BASIS)->key.hex);
   ep_hash_add(&text, "%d %d %d %.17g %llu", s->eigenfunctions, (int)s->model, s->training_poses,
               s->amplitude, (unsigned long long)s->seed);
-  ep_hash_add(&text, "%d %.17g %.17g %.17g %d %.17g %d %.17g", (int)s->integrator, s->damping_mass,
-              s->damping_stiffness, s->strength, (int)s->force, frames->interval, frames->count,
-              s->dt * s->steps);
+  ep_hash_add(&text, "%d %.17g %.17g %.17g %.17g %d %.17g %d %.17g", (int)s->integrator,
+              s->damping_mass, s->damping_stiffness, s->strength, s->relief, (int)s->force,
+              frames->interval, frames->count, s->dt * s->steps);
   hash_loads(&text, s);
   return ep_hash_done(&text);
 }
@@ -108,8 +108,8 @@ static ep_status all_elements(const ep_mesh *mesh, int **out, ep_error *err) {
   return EP_OK;
 }
 
-ep_status ep_bench_model(ep_bench *bench, const ep_cubature *c, ep_model_memory *out,
-                         ep_error *err) {
+ep_status ep_bench_model(ep_bench *bench, const ep_cubature *c, const double *cubic,
+                         ep_precision precision, ep_model_memory *out, ep_error *err) {
   const ep_bake *bake = &bench->bake;
   const ep_mesh *mesh = &bench->shapes.shape[0].mesh;
   const bool examples = bench->shapes.examples > 0;
@@ -124,6 +124,8 @@ ep_status ep_bench_model(ep_bench *bench, const ep_cubature *c, ep_model_memory 
       .s = c ? c->count : mesh->nt,
       .tet = c ? c->tet : all,
       .weight = c ? c->weight : bake->fem.volume,
+      .cubic = cubic,
+      .precision = precision,
   };
   const ep_status status = ep_model_build(&parts, out, err);
   free(all);

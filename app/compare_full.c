@@ -80,6 +80,7 @@ static void set_up_step(run *r, bool examples) {
   r->def.damping_mass = scene->damping_mass;
   r->def.damping_stiffness = scene->damping_stiffness;
   r->def.strength = examples ? scene->strength : 0;
+  r->def.relief = scene->relief;
   r->def.example_force = scene->force;
   r->def.target_solver = timed_newton;
   r->def.target_user = r;
@@ -141,7 +142,7 @@ ep_status ep_compare_full(ep_bench *bench, ep_point *point, ep_frames *frames, e
   void *block = NULL;
   ep_status status = ep_bench_prepare(bench, err);
   if (status == EP_OK && bench->shapes.examples) {
-    status = ep_bench_model(bench, NULL, &memory, err);
+    status = ep_bench_model(bench, NULL, NULL, EP_DOUBLE, &memory, err);
     const size_t bytes = status == EP_OK ? (ep_state_bytes(&memory.model) + 63) / 64 * 64 : 0;
     if (status == EP_OK && !(block = aligned_alloc(64, bytes)))
       status = ep_fail(err, EP_ERR_MEMORY, "no memory for a state");

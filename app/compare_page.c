@@ -13,6 +13,7 @@ enum { SERIES_MAX = 64, LABEL = 24 };
 // Points of one method, material, solver and time step make one line of the chart.
 static bool same_line(const ep_point *a, const ep_point *b) {
   return a->method == b->method && a->material == b->material && a->dt == b->dt &&
+         a->precision == b->precision &&
          (a->method == EP_METHOD_FULL || strcmp(a->solver, b->solver) == 0) &&
          (a->method != EP_METHOD_CUBATURE || a->s == b->s);
 }
@@ -23,6 +24,7 @@ static void name_line(const ep_comparison *c, const ep_point *p, char *name, siz
                                                   "full space"};
   int n = snprintf(name, size, "%s", methods[p->method]);
   if (p->method == EP_METHOD_CUBATURE) n += snprintf(name + n, size - (size_t)n, ", s = %d", p->s);
+  if (p->precision == EP_FLOAT) n += snprintf(name + n, size - (size_t)n, ", float");
   if (s->nmaterials > 1)
     n += snprintf(name + n, size - (size_t)n, ", %s", ep_material_name(p->material));
   if (s->ndt > 1) n += snprintf(name + n, size - (size_t)n, ", dt %.3g", p->dt);
@@ -161,15 +163,16 @@ static ep_status time_chart(const ep_comparison *c, FILE *out, ep_error *err) {
 static ep_status write_csv(const char *path, const ep_comparison *c, ep_error *err) {
   ep_output out;
   EP_TRY(ep_output_open(&out, path, err));
-  fputs("method,material,r,s,dt,solver,failed", out.file);
+  fputs("method,precision,material,r,s,dt,solver,failed", out.file);
 #define X(name, text) fputs("," #name, out.file);
   EP_POINT_NUMBERS(X)
 #undef X
   fputc('\n', out.file);
   for (int i = 0; i < c->count; i++) {
     const ep_point *p = &c->point[i];
-    fprintf(out.file, "%s,%s,%d,%d,%.17g,%s,%d", ep_method_name(p->method),
-            ep_material_name(p->material), p->r, p->s, p->dt, p->solver, p->failed);
+    fprintf(out.file, "%s,%s,%s,%d,%d,%.17g,%s,%d", ep_method_name(p->method),
+            ep_precision_name(p->precision), ep_material_name(p->material), p->r, p->s, p->dt,
+            p->solver, p->failed);
 #define X(name, text) fprintf(out.file, ",%.9g", p->failed ? NAN : p->name);
     EP_POINT_NUMBERS(X)
 #undef X

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "app/compare.h"
+#include "reduced/bake/cubic_coefficients.h"
 
 enum { REPEATS = 5, FORCE_SAMPLES = 12 };
 static const double REPEAT_SECONDS = 1.0; // runs are repeated for timing up to this
@@ -148,25 +149,43 @@ static ep_status run_model(ep_bench *bench, const ep_model *model, ep_point *poi
   return status;
 }
 
-ep_status ep_compare_reduced(ep_bench *bench, ep_point *point, ep_frames *frames, ep_error *err) {
+// Coefficients of the polynomials, malloc'd.
+static ep_status coefficients(ep_bench *bench, double **out, ep_error *err) {
+  const ep_basis *basis = &bench->bake.basis;
+  ep_log quiet = *bench->log;
+  quiet.quiet = true;
+  *out = malloc(ep_cubic_count(basis->r) * sizeof **out);
+  if (!*out)
+    return ep_fail(err, EP_ERR_MEMORY, "no memory for the polynomials of %d modes", basis->r);
+  return ep_cubic_coefficients(&bench->bake.fem, basis->r, basis->u, &quiet, *out, NULL, err);
+}
+
+static ep_status build(ep_bench *bench, ep_point *point, ep_model_memory *out, ep_error *err) {
   ep_cubature cubature = {0};
+  double *cubic = NULL;
+  ep_status status = EP_OK;
+  if (point->method != EP_METHOD_ALL && point->s > 0) status = train(bench, point, &cubature, err);
+  if (status == EP_OK && point->method == EP_METHOD_CUBIC)
+    status = coefficients(bench, &cubic, err);
+  if (status == EP_OK)
+    status = ep_bench_model(bench, point->method == EP_METHOD_ALL ? NULL : &cubature, cubic,
+                            point->precision, out, err);
+  ep_cubature_free(&cubature);
+  free(cubic);
+  return status;
+}
+
+ep_status ep_compare_reduced(ep_bench *bench, ep_point *point, ep_frames *frames, ep_error *err) {
   ep_model_memory memory = {.count = 0};
   EP_TRY(ep_bench_prepare(bench, err));
   const double started = ep_seconds();
-  ep_status status = EP_OK;
-  if (point->method == EP_METHOD_CUBIC)
-    return ep_fail(err, EP_ERR_UNSUPPORTED, "models hold no cubic polynomials yet");
-  if (point->method == EP_METHOD_CUBATURE) status = train(bench, point, &cubature, err);
-  if (status == EP_OK)
-    status =
-        ep_bench_model(bench, point->method == EP_METHOD_CUBATURE ? &cubature : NULL, &memory, err);
+  ep_status status = build(bench, point, &memory, err);
   point->offline_s = bench->basis_seconds + ep_seconds() - started;
   if (status == EP_OK) {
     point->memory_bytes = memory_of(&memory.model);
     status = run_model(bench, &memory.model, point, frames, err);
   }
   ep_model_memory_free(&memory);
-  ep_cubature_free(&cubature);
   return status;
 }
 

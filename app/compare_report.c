@@ -6,6 +6,10 @@
 #include "app/compare.h"
 #include "app/report.h"
 
+const char *ep_precision_name(ep_precision precision) {
+  return precision == EP_FLOAT ? "float" : "double";
+}
+
 // ---- recommendation ----------------------------------------------------------------------------
 
 static bool fits(const ep_sweep *s, const ep_point *p) {
@@ -60,7 +64,7 @@ static const ep_point *find(const ep_comparison *c, ep_method method, int r, int
     const ep_point *p = &c->point[i];
     if (p->method == method && p->r == r && (method != EP_METHOD_CUBATURE || p->s == s) &&
         p->dt == like->dt && strcmp(p->solver, like->solver) == 0 &&
-        p->material == like->material && !p->failed)
+        p->material == like->material && p->precision == EP_DOUBLE && !p->failed)
       return p;
   }
   return NULL;
@@ -73,30 +77,33 @@ static double elastic_part(const ep_point *p) {
 
 double ep_compare_crossover(const ep_comparison *c, int s) {
   const ep_sweep *sweep = &c->scene->sweep;
-  double r_before = 0, ratio_before = NAN;
+  double r_before = 0, ratio_before = NAN, found = NAN;
   for (int i = 0; i < sweep->nmodes && c->count > 0; i++) {
-    const ep_point *a = find(c, EP_METHOD_CUBATURE, sweep->modes[i], s, &c->point[0]);
-    const ep_point *b = find(c, EP_METHOD_CUBIC, sweep->modes[i], 0, &c->point[0]);
+    const int r = sweep->modes[i];
+    const ep_point *a = find(c, EP_METHOD_CUBATURE, r, s, &c->point[0]);
+    const ep_point *b = find(c, EP_METHOD_CUBIC, r, 0, &c->point[0]);
     if (!a || !b) continue;
     const double ratio = log(elastic_part(a) / elastic_part(b));
-    if (ratio <= 0) {
-      if (isnan(ratio_before)) return sweep->modes[i];
-      const double t = ratio_before / (ratio_before - ratio);
-      return r_before * pow(sweep->modes[i] / r_before, t);
-    }
-    r_before = sweep->modes[i];
+    if (!(ratio <= 0)) // slower here: what was found at smaller r does not hold
+      found = NAN;
+    else if (isnan(found))
+      found = isnan(ratio_before)
+                  ? r
+                  : r_before * pow(r / r_before, ratio_before / (ratio_before - ratio));
+    r_before = r;
     ratio_before = ratio;
   }
-  return NAN;
+  return found;
 }
 
 // ---- JSON --------------------------------------------------------------------------------------
 
 static json_t *point_json(const ep_point *p, int frames) {
   json_t *o =
-      json_pack("{s:s, s:s, s:i, s:i, s:f, s:s, s:b, s:b}", "method", ep_method_name(p->method),
-                "material", ep_material_name(p->material), "r", p->r, "s", p->s, "dt", p->dt,
-                "solver", p->solver, "cached", (int)p->cached, "failed", (int)p->failed);
+      json_pack("{s:s, s:s, s:s, s:i, s:i, s:f, s:s, s:b, s:b}", "method",
+                ep_method_name(p->method), "precision", ep_precision_name(p->precision), "material",
+                ep_material_name(p->material), "r", p->r, "s", p->s, "dt", p->dt, "solver",
+                p->solver, "cached", (int)p->cached, "failed", (int)p->failed);
   if (!o) return NULL;
   if (p->failed) {
     json_object_set_new(o, "why", json_string(p->why));
@@ -138,9 +145,9 @@ json_t *ep_compare_json(const ep_comparison *c) {
 // ---- text --------------------------------------------------------------------------------------
 
 static void text_setting(FILE *out, const ep_point *p) {
-  fprintf(out, "%-9s %-12s %4d %6d %9.3g %-12.26s ", ep_method_name(p->method),
-          ep_material_name(p->material), p->method == EP_METHOD_FULL ? 0 : p->r, p->s, p->dt,
-          p->solver);
+  fprintf(out, "%-9s %-6s %-12s %4d %6d %9.3g %-12.26s ", ep_method_name(p->method),
+          ep_precision_name(p->precision), ep_material_name(p->material),
+          p->method == EP_METHOD_FULL ? 0 : p->r, p->s, p->dt, p->solver);
 }
 
 void ep_compare_text(FILE *out, const ep_comparison *c) {
@@ -148,9 +155,9 @@ void ep_compare_text(FILE *out, const ep_comparison *c) {
   fprintf(out, "%s: %d vertices, %d tets, %d examples; errors against %s\n", c->name, c->vertices,
           c->tets, c->examples,
           c->scene->sweep.reference == EP_METHOD_FULL ? "the full space" : "all elements");
-  fprintf(out, "%-9s %-12s %4s %6s %9s %-12s %9s %9s %10s %9s %9s %9s %9s\n", "method", "material",
-          "r", "s", "dt", "solver", "us/step", "min", "offline s", "position", "velocity", "energy",
-          "force");
+  fprintf(out, "%-9s %-6s %-12s %4s %6s %9s %-12s %9s %9s %10s %9s %9s %9s %9s\n", "method", "real",
+          "material", "r", "s", "dt", "solver", "us/step", "min", "offline s", "position",
+          "velocity", "energy", "force");
   for (int i = 0; i < c->count; i++) {
     const ep_point *p = &c->point[i];
     text_setting(out, p);

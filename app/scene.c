@@ -449,6 +449,9 @@ static ep_status read_sweep(const reader *r, const raw_compare *given, ep_scene 
   sweep->nmethods = raw->methods_count ? (int)raw->methods_count : EP_METHODS;
   for (int i = 0; i < sweep->nmethods; i++)
     sweep->method[i] = raw->methods_count ? (ep_method)raw->methods[i] : (ep_method)i;
+  sweep->nprecisions = raw->precisions_count ? (int)raw->precisions_count : 2;
+  for (int i = 0; i < sweep->nprecisions; i++)
+    sweep->precision[i] = raw->precisions_count ? raw->precisions[i] : i;
   sweep->nmaterials = raw->materials_count ? (int)raw->materials_count : 1;
   for (int i = 0; i < sweep->nmaterials; i++)
     sweep->material[i] = raw->materials_count ? (ep_material)raw->materials[i] : out->model;

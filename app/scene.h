@@ -73,7 +73,8 @@ const char *ep_method_name(ep_method method); // "cubature", "cubic", "all", "fu
 enum { EP_LIST_MAX = 16 };
 typedef struct ep_sweep {
   int nmodes, modes[EP_LIST_MAX], nelements, elements[EP_LIST_MAX];
-  int nmethods, nmaterials, nsolvers, ndt;
+  int nmethods, nmaterials, nsolvers, ndt, nprecisions;
+  int precision[2]; // ep_precision, of the cubic polynomials
   ep_method method[EP_METHODS];
   ep_material material[EP_MATERIALS];
   char solver[EP_LIST_MAX][48];        // "newton" or NLopt's name of an algorithm

@@ -1,6 +1,7 @@
 #include "app/scene_schema.h"
 
 #include "app/scene.h"
+#include "reduced/cubic.h"
 #include "reduced/eigenpose.h"
 
 // NOLINTBEGIN: libcyaml's macros
@@ -39,6 +40,10 @@ static const cyaml_strval_t integrator_names[] = {
     {"implicit-euler", EP_IMPLICIT_EULER},
     {"newmark", EP_NEWMARK},
     {"bdf2", EP_BDF2},
+};
+static const cyaml_strval_t precision_names[] = {
+    {"double", EP_DOUBLE},
+    {"float", EP_FLOAT},
 };
 static const cyaml_strval_t method_names[] = {
     {"cubature", EP_METHOD_CUBATURE},
@@ -189,6 +194,8 @@ static const cyaml_schema_field_t output_fields[] = {
 
 static const cyaml_schema_value_t method = {
     CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, method_names, CYAML_ARRAY_LEN(method_names))};
+static const cyaml_schema_value_t precision = {
+    CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, precision_names, CYAML_ARRAY_LEN(precision_names))};
 static const cyaml_schema_value_t material_name = {
     CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, material_names, CYAML_ARRAY_LEN(material_names))};
 static const cyaml_schema_field_t compare_fields[] = {
@@ -197,6 +204,7 @@ static const cyaml_schema_field_t compare_fields[] = {
     CYAML_FIELD_SEQUENCE("methods", OPTIONAL, raw_compare, methods, &method, 1, EP_METHODS),
     CYAML_FIELD_SEQUENCE("materials", OPTIONAL, raw_compare, materials, &material_name, 1,
                          EP_MATERIALS),
+    CYAML_FIELD_SEQUENCE("precisions", OPTIONAL, raw_compare, precisions, &precision, 1, 2),
     CYAML_FIELD_SEQUENCE("solvers", OPTIONAL, raw_compare, solvers, &text, 1, EP_LIST_MAX),
     CYAML_FIELD_SEQUENCE("dt", OPTIONAL, raw_compare, dt, &number, 1, EP_LIST_MAX),
     CYAML_FIELD_ENUM_PTR("reference", OPTIONAL | CYAML_FLAG_STRICT, raw_compare, reference,

@@ -89,8 +89,8 @@ typedef struct raw_output {
 typedef struct raw_compare {
   double *modes, *elements, *dt;
   unsigned modes_count, elements_count, dt_count;
-  int *methods, *materials, *reference;
-  unsigned methods_count, materials_count;
+  int *methods, *materials, *precisions, *reference;
+  unsigned methods_count, materials_count, precisions_count;
   char **solvers, *budget;
   unsigned solvers_count;
 } raw_compare;
