@@ -26,6 +26,7 @@ void ep_bake_close(ep_bake *bake) {
   free(bake->poses);
   free(bake->quality);
   free(bake->paths);
+  free(bake->cubic);
   ep_modes_free(&bake->modes);
   ep_basis_free(&bake->basis);
   ep_cubature_free(&bake->cubature);

@@ -42,6 +42,7 @@ typedef struct ep_bake {
   ep_basis basis;
   ep_cubature cubature;
   ep_green_coefficients green;
+  double *cubic; // (ep_cubic_count(modes)) exact coefficients
 } ep_bake;
 
 // scene, shapes, plan, cache, log are borrowed.
@@ -62,6 +63,7 @@ ep_status ep_bake_paths(ep_bake *bake, ep_error *err);
 ep_status ep_bake_basis(ep_bake *bake, ep_error *err);
 ep_status ep_bake_cubature(ep_bake *bake, ep_error *err);
 ep_status ep_bake_green(ep_bake *bake, ep_error *err);
+ep_status ep_bake_cubic(ep_bake *bake, ep_error *err);
 // The whole bake; path (EP_PATH_MAX) receives the model file in the cache. Stages that were not
 // even looked at, because a later result was there, count as cached.
 ep_status ep_bake_model(ep_bake *bake, char *path, ep_error *err);

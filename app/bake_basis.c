@@ -200,8 +200,8 @@ static ep_status compute_cubature(ep_bake *bake, ep_bake_step *step, ep_error *e
 }
 
 ep_status ep_bake_cubature(ep_bake *bake, ep_error *err) {
-  if (bake->cubature.tet) return EP_OK;
   ep_stage *stage = ep_plan_find(bake->plan, EP_STAGE_CUBATURE);
+  if (bake->cubature.tet || !stage->runs) return EP_OK;
   ep_bake_step step;
   ep_status status = EP_OK;
   ep_bake_begin(bake, stage, &step);
@@ -218,6 +218,7 @@ static ep_status write_model(ep_bake *bake, const char *path, ep_error *err) {
   EP_TRY(ep_bake_fem(bake, err));
   EP_TRY(ep_bake_basis(bake, err));
   EP_TRY(ep_bake_green(bake, err));
+  EP_TRY(ep_bake_cubic(bake, err));
   if (examples) EP_TRY(ep_bake_lb(bake, 0, err));
   const ep_model_parts parts = {
       .fem = &bake->fem,
@@ -229,6 +230,8 @@ static ep_status write_model(ep_bake *bake, const char *path, ep_error *err) {
       .tet = bake->cubature.tet,
       .weight = bake->cubature.weight,
       .green = bake->green.b ? &bake->green : NULL,
+      .cubic = bake->cubic,
+      .precision = bake->scene->evaluator == EP_EVALUATE_CUBIC_FLOAT ? EP_FLOAT : EP_DOUBLE,
   };
   ep_model_memory memory;
   EP_TRY(ep_model_build(&parts, &memory, err));

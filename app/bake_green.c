@@ -1,5 +1,6 @@
 // The stage of the Green-strain path: coefficients of the examples' strains.
 #include <stdlib.h>
+#include <string.h>
 
 #include "app/bake.h"
 
@@ -31,7 +32,9 @@ static ep_status quadrature(const ep_bake *bake, double **out, ep_error *err) {
   const ep_cubature *c = &bake->cubature;
   *out = calloc((size_t)bake->shapes->shape[0].mesh.nt, sizeof **out);
   if (!*out) return ep_fail(err, EP_ERR_MEMORY, "no memory for element weights");
-  for (int i = 0; i < c->count; i++) (*out)[c->tet[i]] += c->weight[i];
+  const bool exact = bake->scene->evaluator != EP_EVALUATE_CUBATURE;
+  if (exact) memcpy(*out, bake->fem.volume, (size_t)bake->fem.mesh->nt * sizeof **out);
+  for (int i = 0; i < c->count && !exact; i++) (*out)[c->tet[i]] += c->weight[i];
   return EP_OK;
 }
 
@@ -45,8 +48,8 @@ static ep_status compute(ep_bake *bake, ep_bake_step *step, ep_error *err) {
   ep_status status = quadrature(bake, &weight, err);
   if (status == EP_OK) status = region_shares(bake, &share, err);
   if (status == EP_OK)
-    status =
-        ep_green_coefficients_compute(&bake->fem, &bake->basis, NULL, weight, share, bake->log, g, err);
+    status = ep_green_coefficients_compute(&bake->fem, &bake->basis, NULL, weight, share, bake->log,
+                                           g, err);
   free(weight);
   free(share);
   if (status != EP_OK) return status;

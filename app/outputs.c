@@ -219,8 +219,9 @@ void ep_summary_text(FILE *out, const json_t *report) {
       out, "  %-30s %8.3f s%s\n", json_string_value(json_object_get(stage, "name")),
       number(stage, "seconds"), json_is_true(json_object_get(stage, "cached")) ? "  (cached)" : "");
   const json_t *error = json_object_get(report, "cubature_error");
-  fprintf(out, "cubature: relative force error %.3g in training, %.3g held out\n",
-          number(error, "train"), number(error, "held_out"));
+  if (number(report, "s") > 0)
+    fprintf(out, "cubature: relative force error %.3g in training, %.3g held out\n",
+            number(error, "train"), number(error, "held_out"));
   fprintf(out, "%.0f of %.0f steps of %.4g s; median %.3f ms a step, %.3f ms of it interpolation\n",
           number(report, "steps_done"), number(report, "steps"), number(report, "dt"),
           number(report, "t_step_ms"), number(report, "t_interp_ms"));

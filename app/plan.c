@@ -11,9 +11,9 @@
 // Raised whenever a stage computes something else from the same input: old results are then not
 // found any more.
 static const int stage_version[] = {
-    [EP_STAGE_EIGEN] = 1, [EP_STAGE_MAP] = 2,    [EP_STAGE_POSES] = 3,    [EP_STAGE_MODES] = 1,
-    [EP_STAGE_PATHS] = 1, [EP_STAGE_BASIS] = 1,  [EP_STAGE_CUBATURE] = 1, [EP_STAGE_GREEN] = 1,
-    [EP_STAGE_MODEL] = 2, [EP_STAGE_TARGET] = 1,
+    [EP_STAGE_EIGEN] = 1, [EP_STAGE_MAP] = 2,   [EP_STAGE_POSES] = 3,    [EP_STAGE_MODES] = 1,
+    [EP_STAGE_PATHS] = 1, [EP_STAGE_BASIS] = 1, [EP_STAGE_CUBATURE] = 1, [EP_STAGE_GREEN] = 1,
+    [EP_STAGE_MODEL] = 3, [EP_STAGE_CUBIC] = 1, [EP_STAGE_TARGET] = 1,
 };
 
 // Matching raises the number of functions to 20 (DESIGN "Maps"), coupling uses 2 m.
@@ -28,10 +28,9 @@ typedef struct planner {
 
 const char *ep_stage_kind_name(ep_stage_kind kind) {
   static const char *const names[] = {
-      [EP_STAGE_EIGEN] = "eigen",          [EP_STAGE_MAP] = "map",
-      [EP_STAGE_POSES] = "poses",          [EP_STAGE_MODES] = "modes",
-      [EP_STAGE_PATHS] = "paths",          [EP_STAGE_BASIS] = "basis",
-      [EP_STAGE_CUBATURE] = "cubature",    [EP_STAGE_MODEL] = "model",
+      [EP_STAGE_EIGEN] = "eigen",          [EP_STAGE_MAP] = "map",     [EP_STAGE_POSES] = "poses",
+      [EP_STAGE_MODES] = "modes",          [EP_STAGE_PATHS] = "paths", [EP_STAGE_BASIS] = "basis",
+      [EP_STAGE_CUBATURE] = "cubature",    [EP_STAGE_MODEL] = "model", [EP_STAGE_CUBIC] = "cubic",
       [EP_STAGE_TARGET] = "interpolation", [EP_STAGE_GREEN] = "green",
   };
   return names[kind];
@@ -284,8 +283,21 @@ static void plan_basis(planner *p) {
   stage->key = ep_hash_done(&text);
 }
 
+static bool uses_descriptors(const planner *p) {
+  return p->shapes->examples && (p->scene->methods & EP_METHOD_LB);
+}
+
+static bool is_cubic(const planner *p) {
+  return p->scene->evaluator != EP_EVALUATE_CUBATURE;
+}
+
 static void plan_cubature(planner *p) {
   const ep_scene *scene = p->scene;
+  if (is_cubic(p) && !uses_descriptors(p) && scene->model == EP_STVK) {
+    add(p, EP_STAGE_CUBATURE, NULL, false, "%s",
+        "the exact polynomials need no elements, and no shape is interpolated");
+    return;
+  }
   ep_stage *stage = add(p, EP_STAGE_CUBATURE, NULL, true, "up to %d elements from %d poses",
                         scene->elements, scene->training_poses);
   ep_hash_text text = key_of(stage->kind);
@@ -295,8 +307,18 @@ static void plan_cubature(planner *p) {
   stage->key = ep_hash_done(&text);
 }
 
-static bool uses_descriptors(const planner *p) {
-  return p->shapes->examples && (p->scene->methods & EP_METHOD_LB);
+static void plan_cubic(planner *p) {
+  if (!is_cubic(p)) {
+    add(p, EP_STAGE_CUBIC, NULL, false, "reduction.evaluator is cubature");
+    return;
+  }
+  ep_stage *stage = add(p, EP_STAGE_CUBIC, NULL, true,
+                        "%zu coefficients of the elastic energy, over all elements",
+                        ep_cubic_count(p->scene->modes));
+  ep_hash_text text = key_of(stage->kind);
+  add_stage_key(p, &text, EP_STAGE_BASIS);
+  ep_hash_add(&text, "%s", p->shapes->physics.hex);
+  stage->key = ep_hash_done(&text);
 }
 
 static void plan_green(planner *p) {
@@ -312,6 +334,7 @@ static void plan_green(planner *p) {
   ep_hash_text text = key_of(stage->kind);
   add_stage_key(p, &text, EP_STAGE_BASIS);
   add_stage_key(p, &text, EP_STAGE_CUBATURE);
+  if (is_cubic(p)) ep_hash_add(&text, "all elements");
   for (int i = 0; i < scene->nfamilies; i++) {
     const ep_family *f = &scene->family[i];
     if (f->has_region)
@@ -329,6 +352,8 @@ static void plan_model(planner *p) {
   ep_hash_add(&text, "m=%d %s", descriptors ? p->scene->eigenfunctions : 0,
               descriptors ? ep_plan_eigen(p->plan, 0)->key.hex : "none");
   add_stage_key(p, &text, EP_STAGE_GREEN);
+  add_stage_key(p, &text, EP_STAGE_CUBIC);
+  if (is_cubic(p)) ep_hash_add(&text, "evaluator %d", (int)p->scene->evaluator);
   stage->key = ep_hash_done(&text);
 }
 
@@ -361,6 +386,7 @@ static ep_status fill(planner *p) {
   plan_paths(p);
   plan_basis(p);
   plan_cubature(p);
+  plan_cubic(p);
   plan_green(p);
   plan_model(p);
   plan_target(p);
@@ -370,7 +396,7 @@ static ep_status fill(planner *p) {
 ep_status ep_plan_make(const ep_scene *scene, const ep_shapes *shapes, ep_plan *out,
                        ep_error *err) {
   memset(out, 0, sizeof *out);
-  const size_t most = (size_t)shapes->count + 2 * (size_t)shapes->examples + 10;
+  const size_t most = (size_t)shapes->count + 2 * (size_t)shapes->examples + 11;
   out->stage = calloc(most, sizeof *out->stage);
   if (!out->stage) return ep_fail(err, EP_ERR_MEMORY, "no memory for the plan");
   planner p = {.scene = scene, .shapes = shapes, .plan = out, .err = err};

@@ -16,6 +16,7 @@ typedef enum ep_stage_kind {
   EP_STAGE_BASIS,    // U
   EP_STAGE_CUBATURE, // elements and weights
   EP_STAGE_GREEN,    // coefficients of the Green-strain path
+  EP_STAGE_CUBIC,    // coefficients of the exact polynomials
   EP_STAGE_MODEL,    // the .epm file
   EP_STAGE_TARGET,   // run time: interpolation of the examples in every step
 } ep_stage_kind;

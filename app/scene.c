@@ -246,6 +246,12 @@ static ep_status read_reduction(const reader *r, const raw_reduction *given, ep_
   for (int i = 0; i < out->nfamilies; i++)
     if (!out->family[i].eigenfunctions) out->family[i].eigenfunctions = out->eigenfunctions;
   EP_TRY(number(r, "reduction.amplitude", raw->amplitude, 0.2, 1e-4, 2, &out->amplitude));
+  out->evaluator = raw->evaluator ? (ep_evaluator)*raw->evaluator : EP_EVALUATE_CUBATURE;
+  if (out->evaluator == EP_EVALUATE_CUBIC && out->model != EP_STVK && out->model != EP_STVK_VOLUME)
+    return bad(r, "reduction.evaluator",
+               "cubic polynomials are exact for stvk and stvk-volume only, not for the material "
+               "model %s; use cubature",
+               ep_material_name(out->model));
   const int examples = ep_scene_examples(out);
   if (examples > out->modes)
     return bad(r, "reduction.modes", "%d modes cannot hold %d examples; use at least %d",
@@ -257,6 +263,12 @@ static ep_status read_simulation(const reader *r, const raw_simulation *given, e
   const raw_simulation none = {0}, *raw = given ? given : &none;
   const raw_damping undamped = {0}, *damping = raw->damping ? raw->damping : &undamped;
   out->integrator = raw->integrator ? (ep_integrator)*raw->integrator : EP_IMPLICIT_EULER;
+  if (raw->precision && (ep_precision)*raw->precision == EP_FLOAT) {
+    if (out->evaluator != EP_EVALUATE_CUBIC)
+      return bad(r, "simulation.precision",
+                 "float is for the cubic polynomials; give reduction.evaluator: cubic");
+    out->evaluator = EP_EVALUATE_CUBIC_FLOAT;
+  }
   EP_TRY(number(r, "simulation.dt", raw->dt, 1.0 / 60, 1e-6, 1, &out->dt));
   EP_TRY(whole(r, "simulation.steps", raw->steps, 120, 1, 1000000, &out->steps));
   EP_TRY(number(r, "simulation.damping.mass", damping->mass, 0.1, 0, 1e6, &out->damping_mass));

@@ -94,6 +94,7 @@ typedef struct ep_scene {
   ep_selection *fixed;
   int nfamilies;
   ep_family *family;
+  ep_evaluator evaluator; // of the elastic energy: cubature, or cubic polynomials (StVK)
   int eigenfunctions, modes, linear_modes, path_samples, elements, training_poses;
   double amplitude;
   ep_integrator integrator;

@@ -36,6 +36,14 @@ static const cyaml_strval_t path_names[] = {
     {"green", EP_METHOD_GREEN},
     {"both", EP_METHOD_LB | EP_METHOD_GREEN},
 };
+static const cyaml_strval_t evaluator_names[] = {
+    {"cubature", EP_EVALUATE_CUBATURE},
+    {"cubic", EP_EVALUATE_CUBIC},
+};
+static const cyaml_strval_t precision_names[] = {
+    {"double", EP_DOUBLE},
+    {"float", EP_FLOAT},
+};
 static const cyaml_strval_t integrator_names[] = {
     {"implicit-euler", EP_IMPLICIT_EULER},
     {"newmark", EP_NEWMARK},
@@ -126,10 +134,16 @@ static const cyaml_schema_value_t family = {
     CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, raw_family, family_fields)};
 
 static const cyaml_schema_field_t reduction_fields[] = {
-    NUMBER(raw_reduction, eigenfunctions), NUMBER(raw_reduction, modes),
-    NUMBER(raw_reduction, linear_modes),   NUMBER(raw_reduction, path_samples),
-    NUMBER(raw_reduction, elements),       NUMBER(raw_reduction, training_poses),
-    NUMBER(raw_reduction, amplitude),      CYAML_FIELD_END,
+    NUMBER(raw_reduction, eigenfunctions),
+    NUMBER(raw_reduction, modes),
+    NUMBER(raw_reduction, linear_modes),
+    NUMBER(raw_reduction, path_samples),
+    NUMBER(raw_reduction, elements),
+    NUMBER(raw_reduction, training_poses),
+    CYAML_FIELD_ENUM_PTR("evaluator", OPTIONAL | CYAML_FLAG_STRICT, raw_reduction, evaluator,
+                         evaluator_names, CYAML_ARRAY_LEN(evaluator_names)),
+    NUMBER(raw_reduction, amplitude),
+    CYAML_FIELD_END,
 };
 
 static const cyaml_schema_field_t damping_fields[] = {
@@ -138,6 +152,8 @@ static const cyaml_schema_field_t damping_fields[] = {
     CYAML_FIELD_END,
 };
 static const cyaml_schema_field_t simulation_fields[] = {
+    CYAML_FIELD_ENUM_PTR("precision", OPTIONAL | CYAML_FLAG_STRICT, raw_simulation, precision,
+                         precision_names, CYAML_ARRAY_LEN(precision_names)),
     CYAML_FIELD_ENUM_PTR("integrator", OPTIONAL | CYAML_FLAG_STRICT, raw_simulation, integrator,
                          integrator_names, CYAML_ARRAY_LEN(integrator_names)),
     NUMBER(raw_simulation, dt),

@@ -51,12 +51,13 @@ typedef struct raw_family {
 typedef struct raw_reduction {
   double *eigenfunctions, *modes, *linear_modes, *path_samples, *elements, *training_poses;
   double *amplitude;
+  int *evaluator;
 } raw_reduction;
 typedef struct raw_damping {
   double *mass, *stiffness;
 } raw_damping;
 typedef struct raw_simulation {
-  int *integrator;
+  int *integrator, *precision;
   double *dt, *steps;
   raw_damping *damping;
 } raw_simulation;
