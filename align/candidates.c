@@ -212,8 +212,11 @@ static double score_of(const ep_frame_candidate *f, double commuting, double iso
   return f->landmark >= 0 ? mean * (0.1 + f->landmark) : mean;
 }
 
-static ep_status try_frame(const ep_side *from, const ep_side *to, const ep_match_rule *rule,
+static ep_status try_frame(const ep_side *from, const ep_side *to, const ep_match_rule *full,
                            int rounds, ep_candidates *c, int which, ep_error *err) {
+  ep_match_rule steep = *full;
+  const ep_match_rule *rule = &steep;
+  steep.step = 3; // enough to tell frames apart
   ep_trial t;
   double commuting = 1, isometry = 1;
   ep_frame_candidate *f = &c->frame[which];
@@ -269,11 +272,17 @@ static void choose(const ep_side *from, const ep_side *to, bool settled, ep_cand
   // 2.5 times better than any flip, those of near-symmetric shapes 0.8 to 1.2 (own measurement,
   // bench_maps and data/).
   static const double CLEARLY = 1.4;
+  static const double TURNED = 45;     // degrees
   static const double SAME_MAP = 0.35; // a flip moves points by the radius and more
   int best = 0;
   for (int i = 1; i < c->count; i++)
     if (c->frame[i].score < c->frame[best].score) best = i;
-  c->chosen = c->frame[c->preferred].score < CLEARLY * c->frame[best].score ? c->preferred : best;
+  // The authored (or the regions') frame is preferred unless it had to be turned far itself, or
+  // landmarks say more.
+  const bool stands = c->frame[c->preferred].reflected == false &&
+                      ep_frame_angle(c->frame[c->preferred].rotation) < TURNED;
+  const double margin = from->marks || (c->preferred == 0 && !stands) ? 1 : CLEARLY;
+  c->chosen = c->frame[c->preferred].score <= margin * c->frame[best].score ? c->preferred : best;
   ep_frame_candidate *chosen = &c->frame[c->chosen];
   chosen->chosen = true;
   for (int i = 0; i < c->count && !settled; i++) {

@@ -56,7 +56,8 @@ static ep_match_rule rule_of(const job *j) {
   const bool family = j->options->same_family;
   int k = family ? FUNCTIONS_FAMILY : FUNCTIONS_SHAPES;
   if (k < j->options->m) k = j->options->m;
-  return (ep_match_rule){.k = k < j->from.k ? k : j->from.k,
+  return (ep_match_rule){.step = 1,
+                         .k = k < j->from.k ? k : j->from.k,
                          .gamma = family ? GAMMA_FAMILY : GAMMA_SHAPES,
                          .region_weight = j->use ? REGION_WEIGHT : 0,
                          .mark_weight = j->options->landmarks ? MARK_WEIGHT : 0,
@@ -295,6 +296,9 @@ static ep_status check_shapes(const ep_shape *from, const ep_shape *to, const ep
                    "a map of %d eigenfunctions between %s and %s, which have %d and %d; ask for at "
                    "most %d",
                    o->m, a, b, from->lb->m, to->lb->m, fewer);
+  if (o->landmarks < 0 || o->landmarks > EP_LANDMARKS_MAX)
+    return ep_fail(err, EP_ERR_ARGUMENT, "%d landmarks; at most %d are taken", o->landmarks,
+                   EP_LANDMARKS_MAX);
   const ep_regions *r = o->regions;
   if (r && (o->from_column < 0 || o->from_column >= r->shapes || o->to_column < 0 ||
             o->to_column >= r->shapes))

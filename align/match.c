@@ -231,7 +231,7 @@ static ep_status polish(matcher *w, int *p, int *tet, double *weight, ep_error *
 ep_status ep_match_levels(const ep_side *from, const ep_side *to, const double r[9],
                           const ep_match_rule *rule, int *p, int *tet, double *weight,
                           ep_error *err) {
-  if (from->k != to->k || rule->k > from->k)
+  if (from->k != to->k || rule->k > from->k || rule->step < 1)
     return ep_fail(err, EP_ERR_ARGUMENT, "matching with %d of %d and %d functions", rule->k,
                    from->k, to->k);
   matcher w;
@@ -243,7 +243,9 @@ ep_status ep_match_levels(const ep_side *from, const ep_side *to, const double r
   }
   int first = rule->k < FIRST_FUNCTIONS ? rule->k : FIRST_FUNCTIONS;
   if (rule->refine) first = rule->k;
-  for (int kk = first; kk <= rule->k && status == EP_OK; kk++) status = match_level(&w, kk, p, err);
+  for (int kk = first; kk <= rule->k && status == EP_OK;
+       kk = kk < rule->k && kk + rule->step > rule->k ? rule->k : kk + rule->step)
+    status = match_level(&w, kk, p, err);
   if (status == EP_OK && tet) status = polish(&w, p, tet, weight, err);
   free_matcher(&w);
   return status;

@@ -84,7 +84,7 @@ ep_status ep_frame_axes(const ep_side *side, double v[9], double variance[3], ep
 
 // ---- match.c: product-space matching in a given frame.
 typedef struct ep_match_rule {
-  int k;                    // functions raised up to
+  int k, step;              // functions raised up to, by so many a level
   double gamma;             // weight of positions
   double region_weight;     // weight of regions, 0 without
   double mark_weight;       // weight of landmarks, 0 without

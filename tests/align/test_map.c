@@ -409,6 +409,90 @@ static void impossible_maps_are_refused(void **state) {
   free_club(&a);
 }
 
+static void refused(const club *a, const ep_landmark *mark, const char *word) {
+  ep_map_options o = ep_default_map_options();
+  ep_map map;
+  ep_error err = {0};
+  o.landmarks = 1;
+  o.landmark = mark;
+  assert_int_equal(ep_map_match(&a->s.shape, &a->s.shape, &o, NULL, &map, &err), EP_ERR_ARGUMENT);
+  assert_non_null(strstr(err.text, word));
+  assert_non_null(strstr(err.text, "landmark 1"));
+  assert_null(map.p);
+}
+
+static void impossible_landmarks_are_refused(void **state) {
+  (void)state;
+  club a;
+  make_club(&a, 8, 4, 3, place_club);
+  refused(&a, &(ep_landmark){.from_vertex = a.s.mesh.nv}, "which has");
+  refused(&a, &(ep_landmark){.to_vertex = 100000}, "which has");
+  refused(&a, &(ep_landmark){.from_vertex = -1, .from = {0, 9, 0}}, "outside");
+  refused(&a, &(ep_landmark){.to_vertex = -1, .to = {NAN, 0, 0}}, "finite");
+  // The same point, given as a vertex and as a point in space, is the same landmark.
+  ep_landmark by_vertex = {0}, by_point = {.from_vertex = -1, .to_vertex = -1};
+  memcpy(by_point.from, a.s.mesh.x, sizeof by_point.from);
+  memcpy(by_point.to, a.s.mesh.x, sizeof by_point.to);
+  ep_map one, other;
+  ep_map_options o = ep_default_map_options();
+  o.landmarks = 1;
+  o.landmark = &by_vertex;
+  match(&a.s, &a.s, &o, &one);
+  o.landmark = &by_point;
+  match(&a.s, &a.s, &o, &other);
+  assert_memory_equal(one.p, other.p, (size_t)one.n * sizeof *one.p);
+  for (int i = 0; i < one.n; i++) assert_int_equal(one.p[i], i);
+  assert_int_equal(one.quality.landmarks, 1);
+  ep_map_free(&one);
+  ep_map_free(&other);
+  free_club(&a);
+}
+
+// A mirrored example: only on request is the mirrored frame a candidate, and then it is found.
+static void reflections_are_found_on_request(void **state) {
+  (void)state;
+  club from;
+  test_shape to;
+  ep_mesh mesh;
+  make_club(&from, 20, 5, 4, place_club);
+  int *order = random_order(from.s.mesh.nv, 15);
+  permute_mesh(&from.s.mesh, order, &mesh);
+  for (int i = 0; i < mesh.nv; i++) mesh.x[3 * i + 2] *= -1;
+  for (int e = 0; e < mesh.nt; e++) {
+    const int t = mesh.tet[4 * e];
+    mesh.tet[4 * e] = mesh.tet[4 * e + 1];
+    mesh.tet[4 * e + 1] = t;
+  }
+  shape_from_mesh(&to, &mesh, FUNCTIONS);
+  ep_map map;
+  ep_map_options o = ep_default_map_options();
+  match(&from.s, &to, &o, &map);
+  for (int i = 0; i < map.quality.candidates; i++) assert_false(map.quality.candidate[i].reflected);
+  assert_true(ep_frame_determinant(map.rotation) > 0);
+  ep_map_free(&map);
+  o.reflections = true;
+  match(&from.s, &to, &o, &map);
+  int mirrored = 0;
+  double least = HUGE_VAL, proper = HUGE_VAL;
+  for (int i = 0; i < map.quality.candidates; i++) {
+    const ep_frame_candidate *f = &map.quality.candidate[i];
+    mirrored += f->reflected;
+    if (f->reflected)
+      least = fmin(least, f->score);
+    else
+      proper = fmin(proper, f->score);
+  }
+  printf("mirrored frames: best score %.3f, proper ones %.3f; chosen det %.0f, %d wrong\n", least,
+         proper, ep_frame_determinant(map.rotation), count_wrong(&map, order));
+  assert_int_equal(mirrored, 4);
+  assert_true(least < proper); // the mirrored frame is exact
+  assert_true(map.quality.verdict != EP_MAP_GOOD || ep_frame_determinant(map.rotation) < 0);
+  ep_map_free(&map);
+  free(order);
+  shape_free(&to);
+  free_club(&from);
+}
+
 // An example lying across the object and nothing given: the record must not call that good unless
 // the map is right all the same.
 static void wrong_frames_are_not_silent(void **state) {
@@ -454,6 +538,8 @@ int main(void) {
       cmocka_unit_test(composition_multiplies),
       cmocka_unit_test(repeats_agree),
       cmocka_unit_test(impossible_maps_are_refused),
+      cmocka_unit_test(impossible_landmarks_are_refused),
+      cmocka_unit_test(reflections_are_found_on_request),
       cmocka_unit_test(wrong_frames_are_not_silent),
   };
   return cmocka_run_group_tests_name("align/map", tests, start, stop);
