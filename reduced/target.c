@@ -138,8 +138,16 @@ static void update_shift(ep_state *state) {
   }
 }
 
+// Where the object will be at the end of the step if nothing acts: the target is frozen within a
+// step, and one that belonged to the beginning would drag like honey (strength K0 dt of viscosity
+// along the manifold). Aimed ahead, it adds inertia instead, and motion along the examples is free.
+static void aim_ahead(ep_state *state, double dt) {
+  for (int a = 0; a < state->model->size.r; a++) state->x[a] = state->q[a] + dt * state->v[a];
+}
+
 ep_status ep_find_target(ep_state *state, const ep_step_def *def, ep_target_report *report) {
-  ep_descriptor(state->model, state->q, state->c);
+  aim_ahead(state, def->dt);
+  ep_descriptor(state->model, state->x, state->c);
   subtract_shift(state, state->c);
   ep_status status = ep_example_weights(state, state->c, state->next_w);
   if (status != EP_OK) return status;

@@ -412,6 +412,8 @@ static ep_status interpolate(step *s, ep_error *err) {
   ep_full *full = s->full;
   to_coordinates(full, full->u);
   memcpy(ep_state_q(full->examples), full->q, (size_t)full->r * sizeof *full->q);
+  to_coordinates(full, full->v);
+  memcpy(ep_state_velocity(full->examples), full->q, (size_t)full->r * sizeof *full->q);
   ep_status status = ep_interpolate(full->examples, s->def, &s->report->target);
   if (status == EP_OK) return EP_OK;
   return ep_fail(err, status, "full-space step: the interpolation of the examples failed");

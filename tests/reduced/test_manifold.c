@@ -67,10 +67,39 @@ static void corners_need_no_shift(void **unused) {
   bar_free(b);
 }
 
+// The target of an object in motion is that of the place it will have reached by the step's end.
+static void aimed_ahead(void **unused) {
+  (void)unused;
+  bar *b = bar_create(6, 2, 2, R, 0, 4, EXAMPLES, EP_STVK_VOLUME);
+  void *moving_block, *still_block;
+  ep_state *moving = bar_state(b, &moving_block), *still = bar_state(b, &still_block);
+  ep_step_def def = ep_default_step();
+  double direction[R];
+  bar_random_q(b, 0.3, direction);
+  for (int a = 0; a < R; a++) {
+    const double begin = 0.4 * b->model.example_q[a], velocity = direction[a] / def.dt;
+    ep_state_q(moving)[a] = begin;
+    ep_state_velocity(moving)[a] = velocity;
+    ep_state_q(still)[a] = begin + def.dt * velocity;
+  }
+  assert_int_equal(ep_interpolate(moving, &def, NULL), EP_OK);
+  assert_int_equal(ep_interpolate(still, &def, NULL), EP_OK);
+  assert_true(distance(ep_state_target(moving), ep_state_target(still), R) == 0);
+  // Not the target of where it is now.
+  const double here[R] = {0};
+  memcpy(ep_state_velocity(moving), here, sizeof here);
+  assert_int_equal(ep_interpolate(moving, &def, NULL), EP_OK);
+  assert_true(distance(ep_state_target(moving), ep_state_target(still), R) > 0);
+  free(moving_block);
+  free(still_block);
+  bar_free(b);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(shape_on_manifold_is_its_own_target),
       cmocka_unit_test(corners_need_no_shift),
+      cmocka_unit_test(aimed_ahead),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
