@@ -176,7 +176,7 @@ static void draw_ticks(canvas *c, const axis *a, const axis *other, bool upright
       const bool fine = digit == 2 || digit == 5;
       if (at < a->low || at > a->high || (digit > 1 && decades > 3.5)) continue;
       if (digit == 1 && d % every) continue;
-      tick(c, a, other, value, upright, digit == 1 || (fine && decades < 2.5));
+      tick(c, a, other, value, upright, digit == 1 || (fine && decades < 2.5) || decades < 0.9);
     }
 }
 
