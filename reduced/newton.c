@@ -107,7 +107,8 @@ ep_status ep_newton_minimise(ep_state *state, ep_newton *newton) {
     double slope = ep_dot(r, state->g, state->direction);
     if (!(slope < 0)) return EP_ERR_NUMERIC;
     // Strains are known to 1e-16, energies ~ strain^2 therefore to 1e-16 sqrt(energy at strain 1).
-    double noise = state->energy_noise * (fabs(newton->energy_now) + fabs(slope)) +
+    const double terms = newton->cancelling ? *newton->cancelling : 0;
+    double noise = state->energy_noise * (fmax(terms, fabs(newton->energy_now)) + fabs(slope)) +
                    1e-15 * sqrt(fabs(newton->energy_now) * state->energy_scale);
     double strain = state->strain_scale * sqrt(ep_dot(r, state->direction, state->direction));
     double step = line_search(state, newton, slope, noise);

@@ -129,6 +129,7 @@ typedef struct ep_newton {
   double (*energy)(void *user, const double *x, double *g, double *h, int project);
   double (*residual)(void *user, const double *x, const double *g); // relative
   void *user;
+  const double *cancelling; // size of the terms of the last energy, where they cancel; or NULL
   double tolerance;
   int max_iterations;
   int iterations, evaluations, line_search_steps, projections; // out

@@ -35,6 +35,7 @@ typedef struct step {
   double rate, inertia; // of the integrator
   double internal;      // last evaluation: |force| inside, energies
   double elastic, pull, strains;
+  double cancelling; // energy of terms that cancel: round-off counts from there
 } step;
 
 // y = scale * K0 (x - origin) added to g; returns (x - origin)^T K0 (x - origin). origin NULL: 0.
@@ -58,8 +59,10 @@ static double inner_energy(step *s, const double *x, double *g, double *h, int p
   const ep_step_def *def = s->def;
   const int as_energy = s->examples && def->example_force == EP_EXAMPLE_ENERGY;
   const int by_cubature = state->model->evaluator == EP_EVALUATE_CUBATURE;
-  const double share =
-      ep_green_share(state->model, &def->green) * (s->examples ? 1 - def->relief : 1);
+  const double kept = s->examples ? 1 - def->relief : 1;
+  const double share = kept * ep_green_share(state->model, &def->green);
+  ep_green green = def->green; // shares what relief leaves, or the sum would have no lower bound
+  green.alpha *= kept;
   int terms = 0;
   if (by_cubature)
     state->term[terms++] = (ep_kernel_term){.scale = share, .weight = state->model->cubature_w};
@@ -71,7 +74,10 @@ static double inner_energy(step *s, const double *x, double *g, double *h, int p
   s->elastic = by_cubature ? state->term[0].energy : ep_cubic_add(state, share, x, g, h, project);
   if (s->examples && !as_energy)
     s->pull = 0.5 * def->strength * add_k0(s, def->strength, x, state->next_target, g);
-  s->strains = ep_green_potential(state, &def->green, x, g, h, project);
+  // At alpha = 1 elastic and example force cancel: the residual is relative to each.
+  if (g) s->internal = sqrt(ep_dot(state->model->size.r, g, g));
+  s->strains = ep_green_potential(state, &green, x, g, h, project);
+  s->cancelling = fabs(s->elastic) + fabs(s->strains);
   return s->elastic + s->pull + s->strains;
 }
 
@@ -82,7 +88,7 @@ static double energy(void *user, const double *x, double *g, double *h, int proj
   const int r = state->model->size.r;
   const double inertia = s->inertia, drag = def->damping_mass * s->rate;
   double sum = inner_energy(s, x, g, h, project);
-  if (g) s->internal = sqrt(ep_dot(r, g, g));
+  if (g) s->internal = fmax(s->internal, sqrt(ep_dot(r, g, g)));
   const double viscous = def->damping_stiffness * s->rate;
   if (viscous > 0) sum += 0.5 * viscous * add_k0(s, viscous, x, state->base, g);
   for (int a = 0; a < r; a++) {
@@ -175,6 +181,7 @@ ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *repor
   ep_newton newton = {.energy = energy,
                       .residual = residual,
                       .user = &s,
+                      .cancelling = &s.cancelling,
                       .tolerance = fmax(def->tolerance, state->force_noise),
                       .max_iterations = def->max_iterations};
   predict(&s);
