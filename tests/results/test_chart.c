@@ -23,7 +23,8 @@ static ep_chart chart_of(const ep_chart_series *series, bool log_x) {
                     .list = series};
 }
 
-static char *svg_of(const ep_chart *chart) {
+// noinline: gcc 12 takes what is returned for a pointer to the variable that held it.
+__attribute__((noinline)) static char *svg_of(const ep_chart *chart) {
   ep_error err = {0};
   char *text;
   size_t size;
@@ -34,7 +35,7 @@ static char *svg_of(const ep_chart *chart) {
 
 // The place of a label's text: 8 right of its point, 5 above.
 static void place_of(const char *svg, const char *label, double *x, double *y) {
-  static char text[32]; // static: gcc takes the walk below for one off its end
+  char text[32];
   snprintf(text, sizeof text, ">%s</text>", label);
   assert_non_null(strstr(svg, text));
   size_t start = (size_t)(strstr(svg, text) - svg);
