@@ -49,10 +49,6 @@ static const cyaml_strval_t integrator_names[] = {
     {"newmark", EP_NEWMARK},
     {"bdf2", EP_BDF2},
 };
-static const cyaml_strval_t precision_names[] = {
-    {"double", EP_DOUBLE},
-    {"float", EP_FLOAT},
-};
 static const cyaml_strval_t method_names[] = {
     {"cubature", EP_METHOD_CUBATURE},
     {"cubic", EP_METHOD_CUBIC},
