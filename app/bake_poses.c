@@ -103,6 +103,7 @@ static ep_status judge(const ep_bake *bake, const ep_stage *stage, const ep_map 
                    "%s: the map is bad: %s. Look at it with 'eigenpose align', or go on with "
                    "map: {accept: true} in family '%s'",
                    stage->name, map->quality.reasons, family->name);
+  if (map->quality.verdict == EP_MAP_DOUBTFUL && !stage->cached) return EP_OK; // said when mapped
   ep_warn(bake->log, "%s: the map is %s: %s", stage->name,
           map->quality.verdict == EP_MAP_DOUBTFUL ? "doubtful"
           : family->accept                        ? "bad (accepted)"

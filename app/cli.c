@@ -54,12 +54,14 @@ enum {
 
 static const struct argp_option eigen_options[] = {
     {"count", KEY_COUNT, "M", 0, "Number of eigenpairs (default 10)", 0},
-    {"out", KEY_OUT, "FILE", 0, "Write the eigenfunctions as a .vtu file", 0},
+    {"out", KEY_OUT, "FILE", 0,
+     "Write the eigenfunctions as a .vtu file, and a .png picture of them beside it", 0},
     OPTION_JSON,
     OPTION_QUIET,
     {0}};
 static const struct argp_option align_options[] = {
-    {"out", KEY_OUT, "DIR", 0, "Write object and examples with transferred coordinates as .vtu", 0},
+    {"out", KEY_OUT, "DIR", 0,
+     "Leave pictures (.png) and fields (.vtu) of every map and transferred pose", 0},
     OPTION_JSON,
     OPTION_QUIET,
     OPTION_SET,

@@ -117,9 +117,12 @@ static void frames_text(FILE *out, const ep_map_quality *q, const ep_mesh *from,
                        : "");
   }
   if (q->settle_from >= 0 && q->settle_to >= 0 && q->settle_other >= 0)
-    fprintf(out, "  a landmark would settle it: vertex %d goes to %d now, or should it to %d?\n",
-            file_number(from, q->settle_from), file_number(to, q->settle_to),
-            file_number(to, q->settle_other));
+    fprintf(
+        out,
+        "  a landmark would settle it: vertex %d with %d, as it is now, or with %d (numbers as in "
+        "a scene, from 1)\n",
+        file_number(from, q->settle_from), file_number(to, q->settle_to),
+        file_number(to, q->settle_other));
 }
 
 static void regions_text(FILE *out, const ep_map_quality *q) {
