@@ -109,6 +109,28 @@ static void a_scene_runs_end_to_end(void **state) {
   if (!(with > 1.5 * without && without > 0)) fail_msg("with %g, without %g", with, without);
 }
 
+// The same bake up to the cubature, then explicit weights; no Laplace-Beltrami space. The larger
+// alpha, the further the same push carries the beam along its example.
+static void the_green_strain_path_runs(void **state) {
+  (void)state;
+  double last = 0;
+  static const char *const alpha[] = {"0", "0.8", "1"};
+  for (size_t i = 0; i < 3; i++) {
+    char set[96];
+    snprintf(set, sizeof set, "--set examples.path=green --set examples.alpha=%s", alpha[i]);
+    json_t *root = run_scene("cache-a", set);
+    const json_t *weights = json_object_get(root, "green_weights");
+    assert_int_equal(json_array_size(weights), 1);
+    assert_int_equal(json_array_size(json_object_get(root, "weights")), 0);
+    assert_true(number(root, "m") == 0 && number(root, "t_interp_ms") == 0);
+    assert_true(number(root, "inverted_tets") == 0 && cached(root, "cubature"));
+    const double w = json_number_value(json_array_get(weights, 0));
+    if (!(w > last)) fail_msg("alpha %s: weight %g, before %g", alpha[i], w, last);
+    last = w;
+    json_decref(root);
+  }
+}
+
 static void the_second_run_bakes_nothing(void **state) {
   (void)state;
   static const char *const stages[] = {"eigen:object", "poses",    "modes", "paths",
@@ -242,6 +264,7 @@ static int set_up(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_scene_runs_end_to_end),
+      cmocka_unit_test(the_green_strain_path_runs),
       cmocka_unit_test(the_second_run_bakes_nothing),
       cmocka_unit_test(two_bakes_are_byte_identical),
       cmocka_unit_test(damaged_results_are_baked_again),
