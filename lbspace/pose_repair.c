@@ -8,8 +8,8 @@
 // the number of active tets. N^-1 is needed between vertices of active tets only: one solve for
 // three new vertices, kept from step to step.
 //
-// Compared on the real poses of cars, gorillas and letters with Newton on the neo-Hookean energy of
-// the whole object, which relaxes the whole pose; this one leaves what is whole where it is.
+// Unlike Newton on an elastic energy of the whole object, which would relax the whole pose, this
+// leaves what is whole where it is.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

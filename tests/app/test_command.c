@@ -26,6 +26,7 @@ static const char scene_text[] =
     "reduction: {eigenfunctions: 5, modes: 8, linear_modes: 5, path_samples: 2, elements: 15,\n"
     "  training_poses: 20, amplitude: 0.1}\n"
     "simulation: {dt: 0.02, steps: 60, damping: {mass: 0.5, stiffness: 0.05}}\n"
+    "examples: {relief: 0.8}\n"
     "loads: [{push: {box: {low: [0.9, -1, -1], high: [2, 2, 2]}, force: [0, 6, 0], ramp: 0.2}}]\n"
     "output: {every: 10}\n";
 
