@@ -78,8 +78,8 @@ typedef struct ep_map_quality {
   double frame_angle; // degrees between authored and final frame
   int regions;
   ep_region_quality *region; // (regions) or NULL
-  int coupled_functions; // m of the coupling: fewer than the map's where regions determine fewer
-  int coupling_k;        // chosen by held-out regions, with mu; 0 without regions
+  int coupled_functions;     // functions the regions alone determine (rank); positions do the rest
+  int coupling_k;            // chosen by held-out regions, with mu; 0 without regions
   double coupling_mu, held_out; // relative residual of the regions left out, each in its turn
   int landmarks;
   double landmark_residual;      // rms distance over the rms radius; 0 without landmarks

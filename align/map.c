@@ -349,9 +349,9 @@ static void say(const job *j, const ep_map *map) {
               "left out of the map; check the order in the region file",
               g + 1, j->from.shape->mesh->name, q->region[g].best_match + 1,
               j->to.shape->mesh->name, q->region[g].jaccard);
-  if (q->regions && q->regions <= map->m + 1)
-    ep_notice(j->log, "%d regions alone do not determine %d functions: positions do the rest",
-              q->regions, map->m);
+  if (q->regions && q->coupled_functions < map->m)
+    ep_notice(j->log, "%d regions alone determine %d of %d functions: positions do the rest",
+              q->regions, q->coupled_functions, map->m);
   if (q->verdict != EP_MAP_GOOD)
     ep_warn(j->log, "map %s <- %s is %s: %s", j->from.shape->mesh->name, j->to.shape->mesh->name,
             q->verdict == EP_MAP_BAD ? "bad" : "doubtful", q->reasons);

@@ -150,6 +150,15 @@ size_t ep_couple_work(const ep_couple_problem *problem);
 ep_status ep_couple_descend(const ep_couple_problem *problem, int iterations, double *a,
                             double *objective, ep_error *err);
 
+// ---- choose.c
+// How many functions the regions determine: rank of f_from (q x m). -1 without memory.
+int ep_couple_determined(int q, int m, const double *f_from);
+// Choose def->k (m or most) and def->mu_data by held-out regions; *residual: relative, of the
+// choice, 0 with fewer than six regions, where def stays as it is. f_to (q x most).
+ep_status ep_couple_choose(ep_coupling *def, int most, int q, const double *lambda_from,
+                           const double *lambda_to, const double *f_from, const double *f_to,
+                           double *residual, ep_error *err);
+
 // ---- quality.c
 // How well region h of `to`, pulled back by p, covers region g of `from`: volume of the common part
 // over that of the union. out (regions x regions), row g.

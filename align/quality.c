@@ -231,13 +231,13 @@ static ep_status judge_coupling(const ep_side *from, const ep_side *to, const co
   EP_TRY(region_functions(from, m, w->f_from, err));
   EP_TRY(region_functions(to, k, w->f_to, err));
   normalise_rows(q, m, k, w->f_from, w->f_to);
-  const ep_couple_problem p = {.k = k,
-                               .m = m,
-                               .q = q,
-                               .lambda_from = w->lambda_from,
-                               .lambda_to = w->lambda_to,
-                               .f_from = w->f_from,
-                               .f_to = w->f_to};
+  ep_couple_problem p = {.k = k,
+                         .m = m,
+                         .q = q,
+                         .lambda_from = w->lambda_from,
+                         .lambda_to = w->lambda_to,
+                         .f_from = w->f_from,
+                         .f_to = w->f_to};
   ep_region_quality *r = map->quality.region;
   memset(w->a, 0, (size_t)k * m * sizeof(double));
   for (int i = 0; i < m; i++) w->a[i * m + i] = 1;
@@ -245,6 +245,18 @@ static ep_status judge_coupling(const ep_side *from, const ep_side *to, const co
   for (int g = 0; g < q; g++) r[g].residual_before = w->each[g];
   ep_coupling def = ep_default_coupling(m);
   def.k = k;
+  map->quality.coupled_functions = ep_couple_determined(q, m, w->f_from);
+  if (map->quality.coupled_functions < 0)
+    return ep_fail(err, EP_ERR_MEMORY, "no memory for %d regions", q);
+  EP_TRY(ep_couple_choose(&def, k, q, w->lambda_from, w->lambda_to, w->f_from, w->f_to,
+                          &map->quality.held_out, err));
+  if (def.k < k) {
+    for (int g = 0; g < q; g++)
+      memmove(w->f_to + (size_t)g * def.k, w->f_to + (size_t)g * k, (size_t)def.k * sizeof(double));
+    p.k = def.k;
+  }
+  map->quality.coupling_k = def.k;
+  map->quality.coupling_mu = def.mu_data;
   EP_TRY(couple_both(&def, &p, map, w, err));
   map->quality.residual_after = region_residuals(&p, w->a, w->each);
   for (int g = 0; g < q; g++) {

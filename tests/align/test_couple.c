@@ -263,8 +263,40 @@ static void refuses_nonsense(void **state) {
       EP_ERR_ARGUMENT);
 }
 
+// Region rows related by an exact rotation: nothing is left on held-out rows, and as many functions
+// are determined as rows, or columns, or independent rows there are.
+static void held_out_rows_choose(void **state) {
+  (void)state;
+  enum { ROWS = 24, WIDE = 8, COLUMNS = 4 };
+  double from[ROWS * COLUMNS], to[ROWS * WIDE], lf[COLUMNS], lt[WIDE], residual;
+  ep_random rng = ep_random_seed(3, 1);
+  for (int i = 0; i < WIDE; i++) lt[i] = 1 + i;
+  for (int i = 0; i < COLUMNS; i++) lf[i] = 1 + i;
+  for (int g = 0; g < ROWS; g++)
+    for (int j = 0; j < WIDE; j++) {
+      to[g * WIDE + j] = ep_random_normal(&rng);
+      // signs flipped: function j of one is -function j of the other
+      if (j < COLUMNS) from[g * COLUMNS + j] = -to[g * WIDE + j];
+    }
+  ep_coupling def = ep_default_coupling(COLUMNS);
+  ep_error err = {0};
+  assert_int_equal(ep_couple_choose(&def, WIDE, ROWS, lf, lt, from, to, &residual, &err), EP_OK);
+  printf("chosen k %d, mu %g, held out %.2e\n", def.k, def.mu_data, residual);
+  assert_true(residual < 1e-3); // 200 iterations of descent
+  assert_int_equal(ep_couple_determined(ROWS, COLUMNS, from), COLUMNS);
+  assert_int_equal(ep_couple_determined(2, COLUMNS, from), 2);
+  memcpy(from + COLUMNS, from, sizeof(double) * COLUMNS);
+  assert_int_equal(ep_couple_determined(2, COLUMNS, from), 1);
+  // Too few rows to leave any out: nothing is chosen, and that is said.
+  def = ep_default_coupling(COLUMNS);
+  assert_int_equal(ep_couple_choose(&def, WIDE, 5, lf, lt, from, to, &residual, &err), EP_OK);
+  assert_int_equal(def.k, 2 * COLUMNS);
+  assert_true(residual == 0);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
+      cmocka_unit_test(held_out_rows_choose),
       cmocka_unit_test(gradient_matches_differences),
       cmocka_unit_test(hidden_rotation_comes_back),
       cmocka_unit_test(wrong_rows_lose_their_weight),
