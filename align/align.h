@@ -59,7 +59,7 @@ typedef struct ep_frame_candidate {
   double score;       // lower is better: what the choice went by
   double distance;    // rms distance of the mapped points, over the rms radius, frames aligned
   double cycle;       // round trip, as in the record
-  double landmark;    // rms distance of the landmarks' images from where they belong; -1 without
+  double landmark;    // rms distance of the landmarks in this frame over the rms radius; -1 without
   int rounds;         // how often it was turned to what its map said
   bool chosen, rival; // the map's own frame; another one that is not clearly worse
 } ep_frame_candidate;
@@ -82,7 +82,7 @@ typedef struct ep_map_quality {
   int coupling_k;            // chosen by held-out regions, with mu; 0 without regions
   double coupling_mu, held_out; // relative residual of the regions left out, each in its turn
   int landmarks;
-  double landmark_residual;      // rms distance over the rms radius; 0 without landmarks
+  double landmark_residual;      // rms of image to partner over the rms radius; 0 without landmarks
   int candidates, rivals;        // frames tried; of those, rivals of the chosen one
   ep_frame_candidate *candidate; // (candidates), authored frame first
   // The landmark that would settle the choice: vertex of `from` and where the chosen frame and the

@@ -261,6 +261,24 @@ static ep_status functional_map(const job *j, ep_map *out, ep_error *err) {
   return status == EP_OK ? ep_polar(m, m, out->a, out->a, err) : status;
 }
 
+// How far the map takes the landmarks (the vertices nearest to them) from their partners: rms over
+// the rms radius of `to`; 0 without landmarks.
+static double landmark_residual(const job *j, const ep_map *map) {
+  const ep_side *to = &j->to;
+  double sum = 0;
+  for (int m = 0; m < to->marks; m++) {
+    const int v = j->from.mark_near[m];
+    const int *tet = to->shape->mesh->tet + 4 * (size_t)map->tet[v];
+    for (int c = 0; c < 3; c++) {
+      double image = 0;
+      for (int i = 0; i < 4; i++)
+        image += map->weight[4 * (size_t)v + i] * to->x[3 * (size_t)tet[i] + c];
+      sum += (image - to->mark_x[3 * m + c]) * (image - to->mark_x[3 * m + c]);
+    }
+  }
+  return to->marks ? sqrt(sum / to->marks) / to->radius : 0;
+}
+
 static ep_status finish(job *j, ep_trial *t, ep_map *out, ep_error *err) {
   const size_t square = (size_t)j->options->m * j->options->m;
   out->n = j->from.n;
@@ -276,6 +294,7 @@ static ep_status finish(job *j, ep_trial *t, ep_map *out, ep_error *err) {
   out->p = t->p;
   t->p = NULL;
   EP_TRY(record_candidates(j, &out->quality, err));
+  out->quality.landmark_residual = landmark_residual(j, out);
   EP_TRY(functional_map(j, out, err));
   memcpy(out->rotation, t->r, sizeof t->r);
   out->scale = j->from.length / j->to.length;

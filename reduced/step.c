@@ -2,7 +2,8 @@
 // mass-orthonormal coordinates (U^T M U = I):
 //   Phi(x) = inertia |x - ahead|^2 / 2 + rate (x - base)^T D (x - base) / 2 + W(x) + beta W_t(x) -
 //   f . x
-// with D = alpha I + beta' K0 and the target's energy W_t frozen within the step.
+// with D = alpha I + beta' K0 and the target's energy W_t frozen within the step; relief takes its
+// share off W while an example force acts.
 #include <math.h>
 #include <string.h>
 

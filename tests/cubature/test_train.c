@@ -391,8 +391,8 @@ static void test_inverted_example(void **state) {
   ep_cubature c;
   ASSERT_OK(ep_cubature_train(&f.b.fem, &f.basis, &o, &log, &c, err));
   assert_int_equal(log.warnings, 1);
-  // A sound example gives .05 here: the ruined elements must not spoil the others' forces.
-  ASSERT_LESS(c.held_out_error, 0.15);
+  // .0078 when this was written: the ruined elements do not spoil the others' forces.
+  ASSERT_LESS(c.held_out_error, 0.02);
   ep_cubature_free(&c);
   free_fixture(&f);
 }
