@@ -1,0 +1,102 @@
+// The examples of a scene: families, their maps and landmarks.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "app/scene_reader.h"
+
+// A place of a landmark on one shape: a vertex, a point, or nothing.
+static ep_status mark(const ep_scene_reader *r, const char *key, const double *vertex,
+                      const double *point, ep_mark *out) {
+  if (vertex && point) return ep_read_refuse(r, key, "give a vertex or a point, not both");
+  out->given = vertex || point;
+  if (point) return ep_read_vector(r, key, point, out->at);
+  return vertex ? ep_read_whole(r, key, vertex, 0, 1, 2147483647, &out->vertex) : EP_OK;
+}
+
+static ep_status read_landmark(const ep_scene_reader *r, const char *key, const raw_landmark *raw,
+                               const ep_family *family, ep_scene_landmark *out) {
+  char part[112];
+  EP_TRY(mark(r, key, raw->object, raw->object_at, &out->object));
+  EP_TRY(mark(r, key, raw->rest, raw->rest_at, &out->rest));
+  if (out->rest.given && !family->rest)
+    return ep_read_refuse(r, key, "the family has no rest shape of its own; give object and poses");
+  if (out->object.given + out->rest.given + (raw->poses_count > 0) < 2)
+    return ep_read_refuse(
+        r, key, "name the place on two shapes: object, rest (or object_at, rest_at), poses");
+  if (raw->poses_count && (int)raw->poses_count != family->poses)
+    return ep_read_refuse(r, key,
+                          "poses lists %u vertices, but the family has %d poses; give one for each",
+                          raw->poses_count, family->poses);
+  out->pose = calloc(raw->poses_count + 1, sizeof *out->pose);
+  if (!out->pose) return ep_read_no_memory(r);
+  out->poses = (int)raw->poses_count;
+  for (unsigned i = 0; i < raw->poses_count; i++) {
+    snprintf(part, sizeof part, "%.90s.poses.%u", key, i);
+    EP_TRY(mark(r, part, &raw->poses[i], NULL, &out->pose[i]));
+  }
+  return EP_OK;
+}
+
+static ep_status read_map(const ep_scene_reader *r, unsigned index, const raw_map *raw,
+                          ep_family *out) {
+  char key[64];
+  out->accept = raw->accept && *raw->accept;
+  out->reflections = raw->reflections && *raw->reflections;
+  if (raw->frame) out->frame = (ep_map_frame)*raw->frame;
+  snprintf(key, sizeof key, "families.%u.map.eigenfunctions", index);
+  if (raw->eigenfunctions)
+    EP_TRY(ep_read_whole(r, key, raw->eigenfunctions, 0, 1, 200, &out->eigenfunctions));
+  out->landmark = calloc(raw->landmarks_count + 1, sizeof *out->landmark);
+  if (!out->landmark) return ep_read_no_memory(r);
+  for (unsigned i = 0; i < raw->landmarks_count; i++) {
+    snprintf(key, sizeof key, "families.%u.map.landmarks.%u", index, i);
+    out->landmarks++;
+    EP_TRY(read_landmark(r, key, &raw->landmarks[i], out, &out->landmark[i]));
+  }
+  snprintf(key, sizeof key, "families.%u.map.regions", index);
+  return raw->regions ? ep_read_file(r, key, raw->regions, &out->regions) : EP_OK;
+}
+
+static ep_status read_family(const ep_scene_reader *r, unsigned index, const raw_family *raw,
+                             ep_family *out) {
+  char key[64], fallback[32];
+  snprintf(fallback, sizeof fallback, "family%u", index);
+  EP_TRY(ep_read_text(r, raw->name ? raw->name : fallback, &out->name));
+  snprintf(key, sizeof key, "families.%u.name", index);
+  if (strlen(out->name) > 24 || strpbrk(out->name, "/ \t\n"))
+    return ep_read_refuse(r, key, "use at most 24 characters, without '/' and blanks");
+  snprintf(key, sizeof key, "families.%u.rest", index);
+  if (raw->rest) EP_TRY(ep_read_file(r, key, raw->rest, &out->rest));
+  out->pose = calloc(raw->poses_count, sizeof *out->pose);
+  if (!out->pose) return ep_read_no_memory(r);
+  for (unsigned i = 0; i < raw->poses_count; i++) {
+    snprintf(key, sizeof key, "families.%u.poses.%u", index, i);
+    out->poses++;
+    EP_TRY(ep_read_file(r, key, raw->poses[i], &out->pose[i]));
+  }
+  if (raw->region) {
+    snprintf(key, sizeof key, "families.%u.region", index);
+    out->has_region = true;
+    EP_TRY(ep_read_selection(r, key, raw->region->box, raw->region->plane, raw->region->file,
+                             &out->region));
+  }
+  return raw->map ? read_map(r, index, raw->map, out) : EP_OK;
+}
+
+ep_status ep_read_families(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out) {
+  if (!raw->families_count) return EP_OK;
+  out->family = calloc(raw->families_count, sizeof *out->family);
+  if (!out->family) return ep_read_no_memory(r);
+  for (unsigned i = 0; i < raw->families_count; i++) {
+    out->nfamilies++;
+    EP_TRY(read_family(r, i, &raw->families[i], &out->family[i]));
+    for (unsigned j = 0; j < i; j++)
+      if (strcmp(out->family[i].name, out->family[j].name) == 0) {
+        char key[64];
+        snprintf(key, sizeof key, "families.%u.name", i);
+        return ep_read_refuse(r, key, "another family is called '%s' too", out->family[i].name);
+      }
+  }
+  return EP_OK;
+}

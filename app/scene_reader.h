@@ -1,0 +1,44 @@
+// Single values of a scene: checked, with the key and its place in every complaint. What the files
+// scene*.c share; everyone else includes app/scene.h.
+#ifndef EP_APP_SCENE_READER_H
+#define EP_APP_SCENE_READER_H
+
+#include "app/scene.h"
+#include "app/scene_load.h"
+
+// What the conversion of one scene needs everywhere.
+typedef struct ep_scene_reader {
+  ep_scene_text *loaded;
+  const char *name, *folder;
+  bool overridden; // with --set the places of the file no longer tell
+  ep_error *err;
+} ep_scene_reader;
+
+// A complaint about the value at a dotted key: EP_ERR_SCENE.
+ep_status ep_read_refuse(const ep_scene_reader *r, const char *key, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+ep_status ep_read_no_memory(const ep_scene_reader *r);
+
+// given NULL: the fallback. Refused outside low..high.
+ep_status ep_read_number(const ep_scene_reader *r, const char *key, const double *given,
+                         double fallback, double low, double high, double *out);
+ep_status ep_read_whole(const ep_scene_reader *r, const char *key, const double *given,
+                        int fallback, int low, int high, int *out);
+ep_status ep_read_vector(const ep_scene_reader *r, const char *key, const double *given,
+                         double *out);                                          // (3)
+ep_status ep_read_text(const ep_scene_reader *r, const char *text, char **out); // malloc'd
+// Resolve a path relative to the scene and see that the file is there; malloc'd.
+ep_status ep_read_file(const ep_scene_reader *r, const char *key, const char *path, char **out);
+// Exactly one of box, plane, path is not NULL.
+ep_status ep_read_selection(const ep_scene_reader *r, const char *key, const raw_box *box,
+                            const raw_plane *plane, const char *path, ep_selection *out);
+// A local gradient-based algorithm of NLopt by name; whether NLopt has it shows when it is made.
+ep_status ep_read_algorithm(const ep_scene_reader *r, const char *key, const char *name,
+                            char out[48]);
+
+// ---- parts of a scene in files of their own ----------------------------------------------------
+ep_status ep_read_families(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out);
+// After everything else of the scene: the defaults come from there.
+ep_status ep_read_sweep(const ep_scene_reader *r, const raw_compare *given, ep_scene *out);
+
+#endif
