@@ -194,7 +194,7 @@ ep_status ep_strain_fit_minimise(const ep_strain_fit *fit, ep_factor *factor, co
 typedef struct workspace {
   ep_csr k0, k;
   ep_factor *factor;
-  double *strain, *u;
+  double *strain, *u, *guess;
 } workspace;
 
 static void workspace_free(workspace *w) {
@@ -203,6 +203,7 @@ static void workspace_free(workspace *w) {
   ep_factor_free(w->factor);
   free(w->strain);
   free(w->u);
+  free(w->guess);
 }
 
 static ep_status workspace_make(const ep_fem *fem, const double *pose, workspace *w,
@@ -210,7 +211,9 @@ static ep_status workspace_make(const ep_fem *fem, const double *pose, workspace
   const ep_mesh *mesh = fem->mesh;
   w->strain = malloc(9 * (size_t)mesh->nt * sizeof *w->strain);
   w->u = calloc(3 * (size_t)mesh->nv, sizeof *w->u);
-  if (!w->strain || !w->u) return ep_fail(err, EP_ERR_MEMORY, "no memory for an example's path");
+  w->guess = malloc(3 * (size_t)mesh->nv * sizeof *w->guess);
+  if (!w->strain || !w->u || !w->guess)
+    return ep_fail(err, EP_ERR_MEMORY, "no memory for an example's path");
   EP_TRY(ep_fem_rest_stiffness(fem, &w->k0, err));
   EP_TRY(ep_csr_from_tets(mesh->nv, mesh->nt, mesh->tet, 3, &w->k, err));
   EP_TRY(ep_factor_create(&w->k0, fem->held, 1, &w->factor, err));
@@ -218,9 +221,29 @@ static ep_status workspace_make(const ep_fem *fem, const double *pose, workspace
   return EP_OK;
 }
 
-static ep_status one_sample(const ep_fem *fem, workspace *w, double strength, ep_log *log,
-                            ep_error *err) {
+// Start of sample i (from 1) of `samples`: the polynomial in w through rest, the samples before
+// and the pose itself, which is the last; or the sample before (w->u), whichever fits better. The
+// path is smooth in w, so the prediction is close, where the exact stiffness is positive definite.
+static void predict(const ep_strain_fit *fit, int i, int samples, const double *out,
+                    const double *pose, workspace *w) {
+  const size_t n3 = 3 * (size_t)fit->fem->mesh->nv;
+  memset(w->guess, 0, n3 * sizeof *w->guess);
+  for (int j = 1; j <= i; j++) { // known: 1 .. i - 1 and `samples`; rest is zero
+    const int at = j < i ? j : samples;
+    double c = (double)i / at;
+    for (int l = 1; l <= i; l++)
+      if (l != j) c *= (double)(i - (l < i ? l : samples)) / (at - (l < i ? l : samples));
+    ep_axpy(n3, c, j < i ? out + (size_t)(j - 1) * n3 : pose, w->guess);
+  }
+  if (ep_strain_fit_energy(fit, w->guess, NULL) < ep_strain_fit_energy(fit, w->u, NULL))
+    memcpy(w->u, w->guess, n3 * sizeof *w->u);
+}
+
+static ep_status one_sample(const ep_fem *fem, workspace *w, int i, int samples, const double *pose,
+                            const double *out, ep_log *log, ep_error *err) {
+  const double strength = (double)i / samples;
   ep_strain_fit fit = {.fem = fem, .strain = w->strain, .w = strength};
+  predict(&fit, i, samples, out, pose, w);
   ep_strain_fit_report report;
   EP_TRY(ep_strain_fit_minimise(&fit, w->factor, &w->k0, &w->k, w->u, &report, err));
   if (report.residual >= TOLERANCE)
@@ -241,7 +264,7 @@ ep_status ep_path_samples(const ep_fem *fem, const double *pose, int samples, ep
   if (samples > 1) EP_TRY_GOTO(status, workspace_make(fem, pose, &w, err), done);
   ep_progress_begin(log, "example path", samples);
   for (int i = 1; i < samples; i++) { // from rest on, each from the one before
-    EP_TRY_GOTO(status, one_sample(fem, &w, (double)i / samples, log, err), done);
+    EP_TRY_GOTO(status, one_sample(fem, &w, i, samples, pose, out, log, err), done);
     memcpy(out + (size_t)(i - 1) * n3, w.u, n3 * sizeof *out);
     ep_progress(log, i);
   }
