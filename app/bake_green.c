@@ -3,26 +3,21 @@
 #include <string.h>
 
 #include "app/bake.h"
+#include "app/regions.h"
 
-// Share of each tet in the region of each example: the mean of the marks of its vertices, so that
-// regions have edges one tet soft. NULL in *out where every example acts everywhere.
+// Share of each tet in the region of each example. NULL in *out where every example acts
+// everywhere.
 static ep_status region_shares(const ep_bake *bake, double **out, ep_error *err) {
   const ep_shapes *shapes = bake->shapes;
   const ep_mesh *mesh = &shapes->shape[0].mesh;
-  bool any = false;
   *out = NULL;
-  for (int i = 0; i < shapes->families; i++) any = any || shapes->region[i];
-  if (!any) return EP_OK;
+  if (!ep_scene_local(bake->scene)) return EP_OK;
   const size_t nt = (size_t)mesh->nt;
   *out = malloc((size_t)shapes->examples * nt * sizeof **out);
   if (!*out) return ep_fail(err, EP_ERR_MEMORY, "no memory for the examples' regions");
   for (int i = 0; i < shapes->examples; i++) {
-    const unsigned char *marks = shapes->region[shapes->example[i].family];
-    for (size_t e = 0; e < nt; e++) {
-      double sum = marks ? 0 : 4;
-      for (int v = 0; marks && v < 4; v++) sum += marks[mesh->tet[4 * e + (size_t)v]];
-      (*out)[(size_t)i * nt + e] = 0.25 * sum;
-    }
+    const int region = bake->scene->family[shapes->example[i].family].region;
+    ep_region_shares(mesh, region < 0 ? NULL : shapes->region[region], *out + (size_t)i * nt);
   }
   return EP_OK;
 }

@@ -337,8 +337,9 @@ static void plan_green(planner *p) {
   if (is_cubic(p)) ep_hash_add(&text, "all elements");
   for (int i = 0; i < scene->nfamilies; i++) {
     const ep_family *f = &scene->family[i];
-    if (f->has_region)
-      ep_hash_add_bytes(&text, f->name, p->shapes->region[i], (size_t)p->shapes->shape[0].mesh.nv);
+    if (f->region >= 0)
+      ep_hash_add_bytes(&text, f->name, p->shapes->region[f->region],
+                        (size_t)p->shapes->shape[0].mesh.nv * sizeof(double));
   }
   stage->key = ep_hash_done(&text);
 }

@@ -68,6 +68,8 @@ static ep_status read_reduction(const ep_scene_reader *r, const raw_reduction *g
   }
   for (int i = 0; i < out->nfamilies; i++)
     if (!out->family[i].eigenfunctions) out->family[i].eigenfunctions = out->eigenfunctions;
+  for (int i = 0; i < out->nregions; i++)
+    if (!out->region[i].eigenfunctions) out->region[i].eigenfunctions = out->eigenfunctions;
   EP_TRY(ep_read_number(r, "reduction.amplitude", raw->amplitude, 0.2, 1e-4, 2, &out->amplitude));
   out->evaluator = raw->evaluator ? (ep_evaluator)*raw->evaluator : EP_EVALUATE_CUBATURE;
   if (out->evaluator == EP_EVALUATE_CUBIC && out->model != EP_STVK && out->model != EP_STVK_VOLUME)
@@ -151,16 +153,24 @@ static ep_status read_path(const ep_scene_reader *r, const raw_examples *raw, ep
   out->methods = raw->path ? *raw->path : EP_METHOD_LB;
   const raw_constraints none = {0}, *weak = raw->constraints ? raw->constraints : &none;
   const bool green = out->methods & EP_METHOD_GREEN;
-  for (int i = 0; i < out->nfamilies; i++)
-    if (out->family[i].has_region && out->methods != EP_METHOD_GREEN)
-      return ep_read_refuse(r, out->family[i].region.key,
-                            "regions of examples need examples.path: green in this version");
   if (!green) return EP_OK;
   EP_TRY(ep_read_number(r, "examples.alpha", raw->alpha, 0.5, 0, 1, &out->green.alpha));
   EP_TRY(ep_read_number(r, "examples.constraints.sum_to_one", weak->sum_to_one, 0, 0, 1e6,
                         &out->green.sum_to_one));
   return ep_read_number(r, "examples.constraints.non_negative", weak->non_negative, 0, 0, 1e6,
                         &out->green.non_negative);
+}
+
+// What examples of a region cannot do: both would act on the whole object.
+static ep_status check_local(const ep_scene_reader *r, const ep_scene *scene) {
+  if (scene->force == EP_EXAMPLE_LINEAR)
+    return ep_read_refuse(r, "examples.force",
+                          "linear pulls the whole object; examples with a region need energy");
+  if (scene->relief > 0 && scene->evaluator != EP_EVALUATE_CUBATURE)
+    return ep_read_refuse(r, "examples.relief",
+                          "exact polynomials cannot leave out a part of the object; with examples "
+                          "of a region use reduction.evaluator: cubature, or relief: 0");
+  return EP_OK;
 }
 
 static ep_status read_examples(const ep_scene_reader *r, const raw_examples *given, ep_scene *out) {
@@ -170,6 +180,9 @@ static ep_status read_examples(const ep_scene_reader *r, const raw_examples *giv
   out->force = raw->force ? (ep_example_force)*raw->force : EP_EXAMPLE_ENERGY;
   out->solver = raw->solver ? (ep_solver)*raw->solver : EP_SOLVER_NLOPT;
   EP_TRY(read_path(r, raw, out));
+  if (ep_scene_local(out) && (out->methods & EP_METHOD_LB)) EP_TRY(check_local(r, out));
+  if (ep_scene_local(out) && (out->methods & EP_METHOD_LB)) // LOCAL-NOT-YET
+    return ep_read_refuse(r, "families", "regions of examples need examples.path: green");
   return ep_read_algorithm(r, "examples.algorithm", raw->algorithm ? raw->algorithm : "LD_LBFGS",
                            out->algorithm);
 }
@@ -197,6 +210,7 @@ static ep_status convert(const ep_scene_reader *r, const raw_scene *raw, ep_scen
   out->seed = (uint64_t)seed;
   EP_TRY(read_object(r, &raw->object, out));
   EP_TRY(read_fixed(r, raw, out));
+  EP_TRY(ep_read_regions(r, raw, out));
   EP_TRY(ep_read_families(r, raw, out));
   EP_TRY(read_reduction(r, raw->reduction, out));
   EP_TRY(read_simulation(r, raw->simulation, out));
@@ -248,8 +262,12 @@ void ep_scene_free(ep_scene *scene) {
     free(family->regions);
     for (int j = 0; j < family->landmarks; j++) free(family->landmark[j].pose);
     free(family->landmark);
-    free(family->region.path);
   }
+  for (int i = 0; i < scene->nregions; i++) {
+    free(scene->region[i].name);
+    free(scene->region[i].where.path);
+  }
+  free(scene->region);
   free(scene->fixed);
   free(scene->load);
   free(scene->family);
@@ -257,6 +275,12 @@ void ep_scene_free(ep_scene *scene) {
   free(scene->name);
   free(scene->mesh);
   memset(scene, 0, sizeof *scene);
+}
+
+bool ep_scene_local(const ep_scene *scene) {
+  for (int i = 0; i < scene->nfamilies; i++)
+    if (scene->family[i].region >= 0) return true;
+  return false;
 }
 
 int ep_scene_examples(const ep_scene *scene) {

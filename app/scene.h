@@ -23,6 +23,16 @@ typedef struct ep_selection {
   char key[64];      // where it stands in the scene, for messages
 } ep_selection;
 
+// A part of the object where examples act: weight 1 on `where`, falling smoothly to 0 over the
+// distance `soft` around it (app/regions.h).
+typedef struct ep_scene_region {
+  char *name;
+  ep_selection where;
+  double soft;        // [length], 0: a hard edge
+  int eigenfunctions; // m of its descriptor
+  double strength;    // factor of examples.strength
+} ep_scene_region;
+
 typedef enum ep_map_frame { EP_FRAME_AUTOMATIC, EP_FRAME_AUTHORED } ep_map_frame;
 // Where a landmark is on one shape: a vertex of the file (from 1), or a point where vertex is 0;
 // or not given.
@@ -49,8 +59,7 @@ typedef struct ep_family {
   bool reflections;   // mirrored frames are tried too
   int eigenfunctions; // of its maps
   bool accept;        // go on with a bad map
-  bool has_region;
-  ep_selection region; // vertices where the poses act (Green-strain path); else everywhere
+  int region;         // where the poses act, number in ep_scene.region; -1: everywhere
 } ep_family;
 
 typedef struct ep_load {
@@ -92,6 +101,8 @@ typedef struct ep_scene {
   ep_elastic material;
   int nfixed;
   ep_selection *fixed;
+  int nregions; // named ones, then those given in families; equal ones are one
+  ep_scene_region *region;
   int nfamilies;
   ep_family *family;
   ep_evaluator evaluator; // of the elastic energy: cubature, or cubic polynomials (StVK)
@@ -125,5 +136,6 @@ ep_status ep_scene_parse(const char *path, const char *folder, const char *text,
 void ep_scene_free(ep_scene *scene);
 
 int ep_scene_examples(const ep_scene *scene); // poses of all families
+bool ep_scene_local(const ep_scene *scene);   // some family acts in a region only
 
 #endif

@@ -59,8 +59,9 @@ static ep_status read_map(const ep_scene_reader *r, unsigned index, const raw_ma
 }
 
 static ep_status read_family(const ep_scene_reader *r, unsigned index, const raw_family *raw,
-                             ep_family *out) {
+                             ep_scene *scene, ep_family *out) {
   char key[64], fallback[32];
+  out->region = -1;
   snprintf(fallback, sizeof fallback, "family%u", index);
   EP_TRY(ep_read_text(r, raw->name ? raw->name : fallback, &out->name));
   snprintf(key, sizeof key, "families.%u.name", index);
@@ -77,9 +78,7 @@ static ep_status read_family(const ep_scene_reader *r, unsigned index, const raw
   }
   if (raw->region) {
     snprintf(key, sizeof key, "families.%u.region", index);
-    out->has_region = true;
-    EP_TRY(ep_read_selection(r, key, raw->region->box, raw->region->plane, raw->region->file,
-                             &out->region));
+    EP_TRY(ep_read_family_region(r, key, out->name, raw->region, scene, &out->region));
   }
   return raw->map ? read_map(r, index, raw->map, out) : EP_OK;
 }
@@ -90,7 +89,7 @@ ep_status ep_read_families(const ep_scene_reader *r, const raw_scene *raw, ep_sc
   if (!out->family) return ep_read_no_memory(r);
   for (unsigned i = 0; i < raw->families_count; i++) {
     out->nfamilies++;
-    EP_TRY(read_family(r, i, &raw->families[i], &out->family[i]));
+    EP_TRY(read_family(r, i, &raw->families[i], out, &out->family[i]));
     for (unsigned j = 0; j < i; j++)
       if (strcmp(out->family[i].name, out->family[j].name) == 0) {
         char key[64];

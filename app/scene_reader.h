@@ -37,6 +37,11 @@ ep_status ep_read_algorithm(const ep_scene_reader *r, const char *key, const cha
                             char out[48]);
 
 // ---- parts of a scene in files of their own ----------------------------------------------------
+// Before the families, which name them.
+ep_status ep_read_regions(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out);
+// The region of a family, by name or given there; *number in ep_scene.region.
+ep_status ep_read_family_region(const ep_scene_reader *r, const char *key, const char *family,
+                                const raw_region *raw, ep_scene *scene, int *number);
 ep_status ep_read_families(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out);
 // After everything else of the scene: the defaults come from there.
 ep_status ep_read_sweep(const ep_scene_reader *r, const raw_compare *given, ep_scene *out);

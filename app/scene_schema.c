@@ -118,12 +118,24 @@ static const cyaml_schema_field_t map_fields[] = {
     CYAML_FIELD_BOOL_PTR("accept", OPTIONAL, raw_map, accept),
     CYAML_FIELD_END,
 };
+static const cyaml_schema_field_t region_fields[] = {
+    TEXT(raw_region, name),
+    PART(raw_region, box, box_fields),
+    PART(raw_region, plane, plane_fields),
+    TEXT(raw_region, file),
+    NUMBER(raw_region, soft),
+    NUMBER(raw_region, eigenfunctions),
+    NUMBER(raw_region, strength),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_value_t region = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, raw_region, region_fields)};
 static const cyaml_schema_field_t family_fields[] = {
     TEXT(raw_family, name),
     TEXT(raw_family, rest),
     CYAML_FIELD_SEQUENCE("poses", CYAML_FLAG_POINTER, raw_family, poses, &text, 1, 64),
     PART(raw_family, map, map_fields),
-    PART(raw_family, region, selection_fields),
+    PART(raw_family, region, region_fields),
     CYAML_FIELD_END,
 };
 static const cyaml_schema_value_t family = {
@@ -231,6 +243,7 @@ static const cyaml_schema_field_t scene_fields[] = {
     NUMBER(raw_scene, seed),
     CYAML_FIELD_MAPPING("object", CYAML_FLAG_DEFAULT, raw_scene, object, object_fields),
     CYAML_FIELD_SEQUENCE("fixed", OPTIONAL, raw_scene, fixed, &selection, 0, 256),
+    CYAML_FIELD_SEQUENCE("regions", OPTIONAL, raw_scene, regions, &region, 0, 64),
     CYAML_FIELD_SEQUENCE("families", OPTIONAL, raw_scene, families, &family, 0, 64),
     PART(raw_scene, reduction, reduction_fields),
     PART(raw_scene, simulation, simulation_fields),

@@ -41,12 +41,19 @@ typedef struct raw_map {
   double *eigenfunctions;
   bool *reflections, *accept;
 } raw_map;
+typedef struct raw_region {
+  char *name;
+  raw_box *box;
+  raw_plane *plane;
+  char *file;
+  double *soft, *eigenfunctions, *strength;
+} raw_region;
 typedef struct raw_family {
   char *name, *rest;
   char **poses;
   unsigned poses_count;
   raw_map *map;
-  raw_selection *region;
+  raw_region *region;
 } raw_family;
 typedef struct raw_reduction {
   double *eigenfunctions, *modes, *linear_modes, *path_samples, *elements, *training_poses;
@@ -102,6 +109,8 @@ typedef struct raw_scene {
   raw_object object;
   raw_selection *fixed;
   unsigned fixed_count;
+  raw_region *regions;
+  unsigned regions_count;
   raw_family *families;
   unsigned families_count;
   raw_reduction *reduction;

@@ -1,5 +1,6 @@
 #include "app/select.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,6 +15,18 @@ static bool inside(const ep_selection *s, const double *x) {
   double side = 0;
   for (int i = 0; i < 3; i++) side += (x[i] - s->a[i]) * s->b[i];
   return side <= 0;
+}
+
+double ep_select_distance(const ep_selection *s, const double *x) {
+  if (inside(s, x)) return 0;
+  double square = 0, side = 0, normal = 0;
+  for (int i = 0; i < 3; i++) {
+    const double out = fmax(0, fmax(s->a[i] - x[i], x[i] - s->b[i]));
+    square += out * out;
+    side += (x[i] - s->a[i]) * s->b[i];
+    normal += s->b[i] * s->b[i];
+  }
+  return s->kind == EP_SELECT_BOX ? sqrt(square) : side / sqrt(normal);
 }
 
 // One number of a list at *text; moves on past it.

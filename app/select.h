@@ -10,6 +10,9 @@
 ep_status ep_select_vertices(const ep_selection *selection, const ep_mesh *mesh,
                              unsigned char *chosen, int *count, ep_error *err);
 
+// Distance of a point (3) from a box or half space, 0 inside.
+double ep_select_distance(const ep_selection *selection, const double *x);
+
 // The union of the scene's fixed selections as ascending vertex numbers; *vertex malloc'd, NULL and
 // *count 0 without any. Errors as above, and EP_ERR_SCENE where every vertex is fixed.
 ep_status ep_select_fixed(const ep_scene *scene, const ep_mesh *mesh, int *count, int **vertex,

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "app/hash_text.h"
+#include "app/regions.h"
 #include "app/select.h"
 #include "mesh/io.h"
 
@@ -80,14 +81,14 @@ static ep_status choose_material(const ep_scene *scene, ep_shapes *out, ep_error
   return EP_OK;
 }
 
-static ep_status select_regions(const ep_scene *scene, ep_shapes *out, ep_error *err) {
+static ep_status weigh_regions(const ep_scene *scene, ep_shapes *out, ep_error *err) {
   const ep_mesh *mesh = &out->shape[0].mesh;
   for (int i = 0; i < scene->nfamilies; i++) {
-    int count;
-    if (!scene->family[i].has_region) continue;
-    out->region[i] = calloc((size_t)mesh->nv, 1);
-    if (!out->region[i]) return ep_fail(err, EP_ERR_MEMORY, "no memory for a region");
-    EP_TRY(ep_select_vertices(&scene->family[i].region, mesh, out->region[i], &count, err));
+    const int at = scene->family[i].region;
+    if (at < 0 || out->region[at]) continue;
+    out->region[at] = calloc((size_t)mesh->nv, sizeof **out->region);
+    if (!out->region[at]) return ep_fail(err, EP_ERR_MEMORY, "no memory for a region");
+    EP_TRY(ep_region_weights(&scene->region[at], mesh, out->region[at], err));
   }
   return EP_OK;
 }
@@ -110,8 +111,8 @@ ep_status ep_shapes_read(const ep_scene *scene, ep_log *log, ep_shapes *out, ep_
   const size_t most = 1 + (size_t)scene->nfamilies + (size_t)examples;
   out->shape = calloc(most, sizeof *out->shape);
   out->rest = calloc((size_t)scene->nfamilies + 1, sizeof *out->rest);
-  out->region = calloc((size_t)scene->nfamilies + 1, sizeof *out->region);
-  out->families = scene->nfamilies;
+  out->region = calloc((size_t)scene->nregions + 1, sizeof *out->region);
+  out->regions = scene->nregions;
   out->example = calloc((size_t)examples + 1, sizeof *out->example);
   ep_status status = EP_OK;
   int object;
@@ -123,7 +124,7 @@ ep_status ep_shapes_read(const ep_scene *scene, ep_log *log, ep_shapes *out, ep_
   if (status == EP_OK) status = choose_material(scene, out, err);
   if (status == EP_OK)
     status = ep_select_fixed(scene, &out->shape[0].mesh, &out->nfixed, &out->fixed, err);
-  if (status == EP_OK) status = select_regions(scene, out, err);
+  if (status == EP_OK) status = weigh_regions(scene, out, err);
   if (status == EP_OK) mark_lb(scene, out);
   if (status != EP_OK) ep_shapes_free(out);
   return status;
@@ -135,7 +136,7 @@ void ep_shapes_free(ep_shapes *shapes) {
   free(shapes->rest);
   free(shapes->example);
   free(shapes->fixed);
-  for (int i = 0; shapes->region && i < shapes->families; i++) free(shapes->region[i]);
+  for (int i = 0; shapes->region && i < shapes->regions; i++) free(shapes->region[i]);
   free(shapes->region);
   memset(shapes, 0, sizeof *shapes);
 }

@@ -33,9 +33,9 @@ typedef struct ep_shapes {
   int examples;
   ep_pose_source *example; // (examples) in order of the scene
   int nfixed, *fixed;      // ascending vertices of the object
-  int families;
-  unsigned char **region; // (families) marks of the vertices a family acts on, NULL: everywhere
-  int nmaterials;         // constants to use (scene before mesh file)
+  int regions;
+  double **region; // (scene regions) weight of each vertex in [0, 1]; NULL: no family acts there
+  int nmaterials;  // constants to use (scene before mesh file)
   const ep_elastic *material;
   ep_digest physics; // hash of material model, constants and their place
 } ep_shapes;
