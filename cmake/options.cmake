@@ -10,6 +10,9 @@ if(EP_SANITIZE)
                       -fno-omit-frame-pointer -g)
   add_link_options(-fsanitize=address,undefined)
 endif()
+if(EP_FUZZ)
+  add_compile_options(-fsanitize=fuzzer-no-link) # coverage of every library for the targets
+endif()
 include_directories(${CMAKE_SOURCE_DIR})
 
 # A static library of one folder; headers are included as "folder/name.h".

@@ -1,20 +1,8 @@
-// What the fuzzer and the replay of its corpus both do with one input.
-#ifndef EP_TESTS_FUZZ_MESH_TARGET_H
-#define EP_TESTS_FUZZ_MESH_TARGET_H
-
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-
+// Mesh files: the first byte chooses the format, the rest is the file.
 #include "mesh/io.h"
+#include "tests/fuzz/target.h"
 
-static inline void must(bool good, const char *what) {
-  if (good) return;
-  fprintf(stderr, "a reader broke its promise: %s\n", what);
-  abort();
-}
-
-static inline void check_mesh(const ep_mesh *m, const ep_mesh_findings *f) {
+static void check_mesh(const ep_mesh *m, const ep_mesh_findings *f) {
   must(m->nv > 0 && m->nt > 0, "not empty");
   must(f->components >= 1 && f->components <= m->nt, "components");
   for (int i = 0; i < 4 * m->nt; i++) must(m->tet[i] >= 0 && m->tet[i] < m->nv, "indices");
@@ -29,8 +17,7 @@ static inline void check_mesh(const ep_mesh *m, const ep_mesh_findings *f) {
   must(ep_mesh_volume(m) >= 0, "volume");
 }
 
-// Returns whether the input was a mesh.
-static inline bool mesh_target(const uint8_t *data, size_t size) {
+bool fuzz_target(const uint8_t *data, size_t size) {
   if (size == 0) return false;
   ep_mesh m;
   ep_mesh_findings f;
@@ -49,5 +36,3 @@ static inline bool mesh_target(const uint8_t *data, size_t size) {
   ep_mesh_free(&m);
   return true;
 }
-
-#endif
