@@ -27,8 +27,9 @@ static void check_scene(const ep_scene *s) {
   }
   for (int i = 0; i < s->nfamilies; i++) {
     must(s->family[i].poses >= 1 && s->family[i].eigenfunctions >= 1, "families");
-    if (s->family[i].has_region) check_selection(&s->family[i].region);
+    must(s->family[i].region >= -1 && s->family[i].region < s->nregions, "regions of families");
   }
+  for (int i = 0; i < s->nregions; i++) check_selection(&s->region[i].where);
   must(s->sweep.nmodes >= 1 && s->sweep.ndt >= 1 && s->sweep.nsolvers >= 1, "sweeps");
 }
 
@@ -58,8 +59,7 @@ static void resolve(const ep_scene *scene, int family, ep_mesh mesh) {
                             .shape = shape,
                             .rest = rest,
                             .examples = poses,
-                            .example = example,
-                            .families = scene->nfamilies};
+                            .example = example};
   for (int to = 1; to < shapes.count; to++) {
     ep_error err = {0};
     int count = 0;
