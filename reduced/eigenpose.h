@@ -11,6 +11,7 @@
 
 #include "base/status.h"
 #include "reduced/cubic.h"
+#include "reduced/frame.h"
 #include "reduced/integrator.h"
 #include "reduced/material.h"
 #include "reduced/model_arrays.h"
@@ -81,6 +82,22 @@ double *ep_state_q(ep_state *state);             // (r) reduced coordinates, may
 double *ep_state_velocity(ep_state *state);      // (r) may be written
 const double *ep_state_weights(const ep_state *state); // (k) example weights of the last step
 const double *ep_state_target(const ep_state *state);  // (r) target configuration of the last step
+
+// ---- free motion (reduced/frame.h) -----------------------------------------------------------
+// A model is free where nothing holds it (size.rigid): its states then move as a whole too. For a
+// held model the frame stays the identity about the origin: world and model space are the same.
+const ep_frame *ep_state_frame(const ep_state *state); // at the end of the last step
+// Put the object elsewhere, keeping its momenta. Errors: EP_ERR_ARGUMENT (held, not finite, R no
+// rotation to 1e-9).
+ep_status ep_state_set_frame(ep_state *state, const ep_frame *frame);
+// Velocity of the centre of mass and angular velocity [rad/s], both in world axes; set: momenta
+// follow for the state's q and velocity. Errors: EP_ERR_ARGUMENT (held, not finite).
+void ep_state_motion(const ep_state *state, double velocity[3], double spin[3]);
+ep_status ep_state_set_motion(ep_state *state, const double velocity[3], const double spin[3]);
+// Linear momentum and angular momentum about the centre of mass, world axes; 0 for a held model.
+void ep_state_momentum(const ep_state *state, double linear[3], double angular[3]);
+// Positions in the world (n x 3): c + R (X - X_0 + U q), for a held model X + U q.
+void ep_state_positions(const ep_state *state, double *x);
 
 // ---- energies --------------------------------------------------------------------------------
 // (Not ep_elastic: that is the type of material constants in mesh/mesh.h.)

@@ -91,6 +91,7 @@ static ep_status read_sizes(const ep_tensorfile *file, ep_model_sizes *z, char *
   if (z->k > MAX_EXAMPLES || z->m > z->n || (z->k > 0 && z->m < 1 && z->greens < 1))
     return ep_text_refuse(message, "impossible sizes: k examples need descriptors, 1 <= m <= n, or "
                                    "the coefficients of their strains");
+  if (z->rigid > 1) return ep_text_refuse(message, "rigid is neither 0 nor 1");
   if (z->greens > z->k) return ep_text_refuse(message, "greens is more than the examples, k");
   return EP_OK;
 }
@@ -167,7 +168,7 @@ static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *m
   const int n = model->size.n, nt = model->size.nt, r = model->size.r, m = model->size.m;
   const int k = model->size.k, s = model->size.s, blocks = model->size.blocks;
   const int greens = model->size.greens, cubic = model->size.cubic;
-  const int cubic_float = model->size.cubic_float;
+  const int cubic_float = model->size.cubic_float, rigid = model->size.rigid;
   const void *data;
 #define DTYPE_double EP_F64
 #define DTYPE_int32  EP_I32
@@ -190,6 +191,8 @@ static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *m
   FIRST_FAILURE(check_at_least_zero("cubature_lambda", model->cubature_lambda, s, message));
   FIRST_FAILURE(check_at_least_zero("cubature_mu", model->cubature_mu, s, message));
   FIRST_FAILURE(check_at_least_zero("green_scale", model->green_scale, greens ? 1 : 0, message));
+  if (rigid && !(model->rigid_mass[0] > 0))
+    return refuse_array(message, "rigid_mass", "not positive");
   return check_at_least_zero("example_w", model->example_w, m ? k * s : 0, message);
 }
 

@@ -6,11 +6,12 @@
 //   included for constrained objects; 0 where no descriptors are used), k examples, s cubature
 //   elements, blocks = ceil(r / 8): groups of 8 modes, greens independent strains of the examples
 //   (Green-strain path; 0: not used), cubic and cubic_float reals of the cubic path's streams (0:
-//   not used; then without interpolation s may be 0).
+//   not used; then without interpolation s may be 0), rigid 1 where nothing is held (free motion).
 #ifndef EP_REDUCED_MODEL_ARRAYS_H
 #define EP_REDUCED_MODEL_ARRAYS_H
 
-#define EP_MODEL_SIZES(X) X(n) X(nt) X(r) X(m) X(k) X(s) X(blocks) X(greens) X(cubic) X(cubic_float)
+#define EP_MODEL_SIZES(X)                                                                          \
+  X(n) X(nt) X(r) X(m) X(k) X(s) X(blocks) X(greens) X(cubic) X(cubic_float) X(rigid)
 
 // clang-format off
 #define EP_MODEL_ARRAYS(X)                                                                        \
@@ -49,7 +50,17 @@
   /* floats; sums over all elements: largest |G_e|_F, energy and force at unit strain */          \
   X(double, cubic_stream,  cubic, 1, 1)                                                           \
   X(float,  cubic_stream_float, cubic_float, 1, 1)                                                \
-  X(double, cubic_scales,  cubic > 0 || cubic_float > 0 ? 3 : 0, 1, 1)
+  X(double, cubic_scales,  cubic > 0 || cubic_float > 0 ? 3 : 0, 1, 1)                            \
+  /* free motion (reduced/frame.h), with y = X - X_0 + U q: mass, X_0, and the sums that give */   \
+  /* sum m y y^T = S0 + sum_a q_a S1_a + sum_ab q_a q_b S2_ab and sum m U q x U q'. Symmetric */    \
+  /* 3 x 3 as xx yy zz yz zx xy; S1_a = sum m (X U_a^T + U_a X^T); pairs a >= b in lower */         \
+  /* triangles, row by row: S2_ab = sum m (U_a U_b^T + U_b U_a^T) / 2, h_ab = sum m U_a x U_b */    \
+  X(double, rigid_mass,    rigid, 1, 1)                                                           \
+  X(double, rigid_origin,  rigid, 3, 1)                                                           \
+  X(double, rigid_s0,      rigid, 6, 1)                                                           \
+  X(double, rigid_s1,      rigid, 6, r)                                                           \
+  X(double, rigid_s2,      rigid, 6, r * (r + 1) / 2)                                             \
+  X(double, rigid_h,       rigid, 3, r * (r + 1) / 2)
 // clang-format on
 
 #endif

@@ -69,6 +69,7 @@ ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_st
   state->kernel = ep_kernel_select(&state->isa);
   state->green_kernel = ep_green_select();
   state->w[0] = 1;
+  ep_state_rest_frame(state);
   state->energy_noise = 1e-13;
   const int narrow = model->evaluator == EP_EVALUATE_CUBIC_FLOAT;
   if (narrow) state->energy_noise = 2e-6, state->force_noise = 1e-5;

@@ -75,10 +75,16 @@ struct ep_state {
   double strain_scale; // max_j |G_j|_F: strain by a unit q
   int has_target;      // a target was found before
   double dt_before;    // of the last step; 0: none, or q or v was written since
+  ep_frame frame;      // free motion: reduced/frame.h; at the end of the last step
+  double linear[3];    // momentum, angular momentum about the centre of mass; world axes
+  double angular[3];
 #define X(name, count) double *name;
   EP_STATE_ARRAYS(X)
 #undef X
 };
+
+// (reduced/frame.c) Model space is the world; at rest.
+void ep_state_rest_frame(ep_state *state);
 
 // (reduced/model.c) The evaluator a model should use; EP_ERR_FORMAT and why where it lacks the
 // arrays.

@@ -56,9 +56,9 @@ static ep_status check_parts(const ep_model_parts *p, ep_error *err) {
 static ep_status allocate(builder *b, ep_model_memory *out, ep_error *err) {
   const ep_model_sizes *z = &b->size;
   int n = z->n, nt = z->nt, r = z->r, m = z->m, k = z->k, s = z->s, blocks = z->blocks;
-  int greens = z->greens, cubic = z->cubic, cubic_float = z->cubic_float;
+  int greens = z->greens, cubic = z->cubic, cubic_float = z->cubic_float, rigid = z->rigid;
   (void)n, (void)nt, (void)r, (void)m, (void)k, (void)s, (void)blocks, (void)greens, (void)cubic,
-      (void)cubic_float;
+      (void)cubic_float, (void)rigid;
 #define X(type, name, d1, d2, d3)                                                                  \
   if ((size_t)(d1) * (size_t)(d2) * (size_t)(d3) > 0) {                                            \
     size_t bytes = (size_t)(d1) * (size_t)(d2) * (size_t)(d3) * sizeof *b->a.name;                 \
