@@ -1,7 +1,7 @@
 cmake_policy(VERSION 3.22)
 # What the run-time library calls from outside: libm and memory functions, nothing else. Symbols it
 # defines itself are taken off first.
-set(allowed log1p|sqrt|memcpy|memset|memcmp|memchr|memmove|strcmp|strlen|fmax|fmin
+set(allowed log1p|sqrt|sin|atan2|memcpy|memset|memcmp|memchr|memmove|strcmp|strlen|fmax|fmin
     # the compilers' own: processor features, stack protector of hardened builds
     |__cpu_model|__cpu_indicator_init|__stack_chk_fail|_GLOBAL_OFFSET_TABLE_)
 string(REPLACE ";" "" allowed "${allowed}")
