@@ -126,7 +126,7 @@ static ep_status all_steps(run *r, ep_point *point, ep_frames *frames, ep_error 
 static ep_status simulate(run *r, ep_state *examples, ep_point *point, ep_frames *frames,
                           ep_error *err) {
   const double started = ep_seconds();
-  EP_TRY(ep_full_create(&r->bench->bake.fem, examples, &r->full, err));
+  EP_TRY(ep_full_create(&r->bench->bake.fem, examples, NULL, &r->full, err));
   point->offline_s = ep_seconds() - started;
   point->memory_bytes = (double)ep_full_bytes(r->full);
   EP_TRY(make_loads(r, err));

@@ -11,11 +11,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "reduced/green_weights.h"
 #include "reduced/state.h"
-
-// Changes of the set of negative weights before giving up; each strictly lowers a convex function,
-// and the sets met in practice are reached in two or three.
-enum { SETS_MAX = 64 };
 
 ep_green_kernel ep_green_select(void) {
 #if defined(__x86_64__)
@@ -32,98 +29,24 @@ int ep_green_valid(const ep_green *green) {
          isfinite(green->sum_to_one) && green->non_negative >= 0 && isfinite(green->non_negative);
 }
 
-// w = V y
-static void weights_of(const ep_model *m, const double *y, double *w) {
-  for (int j = 0; j < m->size.k; j++)
-    w[j] = ep_dot(m->size.greens, m->green_weights + (size_t)j * (size_t)m->size.greens, y);
-}
-
-// Factor of C for the weights w (their signs) into green_c; right-hand side y0 + sigma a into y.
-static int constrained_system(ep_state *state, const ep_green *green, const double *w) {
-  const ep_model *m = state->model;
-  const int p = m->size.greens, k = m->size.k;
-  const double sigma = green->sum_to_one * m->green_scale[0];
-  const double nu = green->non_negative * m->green_scale[0];
-  double *c = state->green_c, *a = state->green_a;
-  memset(a, 0, (size_t)p * sizeof *a);
-  memset(c, 0, (size_t)(p * p) * sizeof *c);
-  for (int i = 0; i < p; i++) c[(p + 1) * i] = 1;
-  for (int j = 0; j < k; j++) {
-    const double *v = m->green_weights + (size_t)j * (size_t)p;
-    for (int i = 0; i < p; i++) a[i] += v[i];
-    if (w[j] >= 0 || nu == 0) continue;
-    for (int i = 0; i < p; i++)
-      for (int l = 0; l < p; l++) c[p * i + l] += nu * v[i] * v[l];
-  }
-  for (int i = 0; i < p; i++) {
-    for (int l = 0; sigma > 0 && l < p; l++) c[p * i + l] += sigma * a[i] * a[l];
-    state->green_y[i] = state->green_y0[i] + sigma * a[i];
-  }
-  return ep_cholesky(p, c, c);
-}
-
-// The function minimised over y; w are the weights of y.
-static double objective(const ep_state *state, const ep_green *green, const double *y,
-                        const double *w) {
-  const ep_model *m = state->model;
-  double sum = 0, negative = 0;
-  for (int j = 0; j < m->size.k; j++) {
-    sum += w[j];
-    if (w[j] < 0) negative += w[j] * w[j];
-  }
-  const double unit = m->green_scale[0];
-  double energy = unit * green->non_negative * negative;
-  if (green->sum_to_one > 0) energy += unit * green->sum_to_one * (sum - 1) * (sum - 1);
-  for (int i = 0; i < m->size.greens; i++) energy += y[i] * (y[i] - 2 * state->green_y0[i]);
-  return energy;
-}
-
-static int same_signs(int k, const double *v, const double *w) {
-  for (int j = 0; j < k; j++)
-    if ((v[j] < 0) != (w[j] < 0)) return 0;
-  return 1;
-}
-
-// Newton on the convex, piecewise quadratic objective: exact once the set of negative weights
-// stays. Where a full step does not lower the objective it is halved (the set may cycle otherwise).
-static int constrained_weights(ep_state *state, const ep_green *green) {
-  const int p = state->model->size.greens, k = state->model->size.k;
-  double *y = state->green_y, *last = state->green_last, *w = state->green_w;
-  double *trial_w = state->green_trial_w;
-  memcpy(last, state->green_y0, (size_t)p * sizeof *last);
-  weights_of(state->model, last, w);
-  double best = objective(state, green, last, w);
-  for (int set = 0; set < SETS_MAX; set++) {
-    if (!constrained_system(state, green, w)) return 0;
-    ep_solve_lower(p, state->green_c, y);
-    ep_solve_lower_transposed(p, state->green_c, y);
-    weights_of(state->model, y, trial_w);
-    const int settled = green->non_negative == 0 || same_signs(k, w, trial_w);
-    double energy = objective(state, green, y, trial_w);
-    for (int i = 0; !settled && i < 40 && energy > best; i++) {
-      for (int j = 0; j < p; j++) y[j] = 0.5 * (y[j] + last[j]);
-      weights_of(state->model, y, trial_w);
-      energy = objective(state, green, y, trial_w);
-    }
-    const int stuck = !settled && energy >= best; // round-off: nothing left to gain
-    best = energy;
-    memcpy(last, y, (size_t)p * sizeof *last);
-    memcpy(w, trial_w, (size_t)k * sizeof *w);
-    if (settled || stuck) return 1;
-  }
-  return 0;
+static ep_green_problem problem_of(const ep_model *m, const ep_green *green) {
+  return (ep_green_problem){.p = m->size.greens,
+                            .k = m->size.k,
+                            .v = m->green_weights,
+                            .sigma = green->sum_to_one * m->green_scale[0],
+                            .nu = green->non_negative * m->green_scale[0]};
 }
 
 // y, its weights and W_a; C's factor in green_c where there are constraints.
 static double solve_weights(ep_state *state, const ep_green *green) {
-  const ep_model *m = state->model;
-  const int constrained = green->sum_to_one > 0 || green->non_negative > 0;
-  if (constrained && !constrained_weights(state, green)) return NAN;
-  if (!constrained) {
-    memcpy(state->green_y, state->green_y0, (size_t)m->size.greens * sizeof(double));
-    weights_of(m, state->green_y, state->green_w);
-  }
-  return objective(state, green, state->green_y, state->green_w);
+  const ep_green_problem problem = problem_of(state->model, green);
+  ep_green_solution solution = {.y = state->green_y,
+                                .w = state->green_w,
+                                .c = state->green_c,
+                                .last = state->green_last,
+                                .a = state->green_a,
+                                .trial_w = state->green_trial_w};
+  return ep_green_weights(&problem, state->green_y0, &solution);
 }
 
 // low := scale L^-1 J with C = L L^T (the identity without constraints).

@@ -5,15 +5,21 @@
 #define EP_BAKE_FULL_STEP_H
 
 #include "reduced/bake/fem.h"
+#include "reduced/bake/green_full.h"
 #include "reduced/eigenpose.h"
 
 typedef struct ep_full ep_full;
 
 // examples: a state of a model of the same mesh, or NULL without example forces; borrowed. The
 // example force of a step is that of the model at q = U^T M u, lifted by M U: U U^T of the papers,
-// as the gradient of a potential of u. fem is borrowed too. Needs a PETSc session.
-// Errors: EP_ERR_ARGUMENT (another mesh), EP_ERR_NUMERIC, EP_ERR_MEMORY.
-ep_status ep_full_create(const ep_fem *fem, ep_state *examples, ep_full **out, ep_error *err);
+// as the gradient of a potential of u. green: the strains of the examples on the same mesh, or NULL
+// without the Green-strain path; def->green says how they act, as in ep_step (mixed form for other
+// materials than StVK, weak constraints). Its Hessian is sparse but for one dense column per
+// strain: Newton solves by Woodbury, with the interpolation path by conjugate gradients
+// preconditioned so. fem and green are borrowed too. Needs a PETSc session. Errors: EP_ERR_ARGUMENT
+// (another mesh), EP_ERR_NUMERIC, EP_ERR_MEMORY.
+ep_status ep_full_create(const ep_fem *fem, ep_state *examples, ep_green_full *green, ep_full **out,
+                         ep_error *err);
 void ep_full_free(ep_full *full);
 
 // (3n) displacement and velocity; may be written (zero at held unknowns).
@@ -27,6 +33,7 @@ typedef struct ep_full_report {
   double residual; // |gradient| over the forces in play
   ep_target_report target;
   double elastic_energy, example_energy, kinetic_energy; // at the end of the step
+  double green_energy;                                   // as in ep_step_report
 } ep_full_report;
 
 // One step. def as for ep_step, but def->force is the nodal force (3n) [N] at the end of the step

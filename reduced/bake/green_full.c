@@ -7,12 +7,29 @@
 #include "linalg/dense.h"
 #include "reduced/bake/fem_assembly.h"
 #include "reduced/bake/vectors.h"
+#include "reduced/green_weights.h"
 
 static const double TOLERANCE = 1e-8, ARMIJO = 1e-4;
 enum { ITERATIONS = 200, HALVINGS = 40 };
 
 static ep_status no_memory(ep_error *err) {
   return ep_fail(err, EP_ERR_MEMORY, "no memory for the full-space Green-strain potential");
+}
+
+static ep_status small_arrays(ep_green_full *full, ep_error *err) {
+  const size_t p = (size_t)full->space.count, k = (size_t)full->space.k;
+  full->block = calloc(4 * p + 2 * k + 3 * p * p, sizeof *full->block);
+  if (!full->block) return no_memory(err);
+  full->y0 = full->block;
+  full->y = full->y0 + p;
+  full->last = full->y + p;
+  full->ones = full->last + p;
+  full->w = full->ones + p;
+  full->trial_w = full->w + k;
+  full->factor = full->trial_w + k;
+  full->system = full->factor + p * p;
+  full->small = full->system + p * p;
+  return EP_OK;
 }
 
 ep_status ep_green_full_create(const ep_fem *fem, const double *weight, int k, const double *poses,
@@ -22,9 +39,10 @@ ep_status ep_green_full_create(const ep_fem *fem, const double *weight, int k, c
   EP_TRY(ep_green_space_create(fem, weight, k, poses, share, log, &out->space, err));
   const size_t numbers = 6 * (size_t)fem->mesh->nt, count = (size_t)out->space.count;
   out->stress = calloc(count * numbers, sizeof *out->stress);
-  if (!out->stress) {
+  const ep_status status = out->stress ? small_arrays(out, err) : no_memory(err);
+  if (status != EP_OK) {
     ep_green_full_free(out);
-    return no_memory(err);
+    return status;
   }
   for (size_t i = 0; i < count; i++)
     for (size_t j = 0; j < (size_t)k; j++)
@@ -36,7 +54,20 @@ ep_status ep_green_full_create(const ep_fem *fem, const double *weight, int k, c
 void ep_green_full_free(ep_green_full *full) {
   ep_green_space_free(&full->space);
   free(full->stress);
+  free(full->block);
   *full = (ep_green_full){0};
+}
+
+// The constraints count in units of the examples' mean strain energy, as in the reduced model.
+static ep_green_problem problem_of(const ep_green_full *full) {
+  const ep_green_space *s = &full->space;
+  double unit = 0;
+  for (int j = 0; j < s->k; j++) unit += s->gram[(s->k + 1) * j] / s->k;
+  return (ep_green_problem){.p = s->count,
+                            .k = s->k,
+                            .v = s->weights,
+                            .sigma = unit * full->weak.sum_to_one,
+                            .nu = unit * full->weak.non_negative};
 }
 
 static const double *stress_at(const ep_green_full *full, int i, int e) {
@@ -65,27 +96,38 @@ static void combine(const ep_green_full *full, int e, const double *c, double sc
   for (int i = 0; i < full->space.count; i++) ep_axpy(6, scale * c[i], stress_at(full, i, e), s);
 }
 
-double ep_green_full_energy(const ep_green_full *full, const double *u, double *y, double *f,
-                            double *w) {
-  const ep_green_space *space = &full->space;
-  const ep_fem *fem = space->fem;
-  const int count = space->count, nt = fem->mesh->nt;
-  memset(y, 0, (size_t)count * sizeof *y);
-  for (int e = 0; e < nt; e++) {
+// y0_i = <O_i, E(u)>
+static void products(const ep_green_full *full, const double *u, double *y0) {
+  const ep_fem *fem = full->space.fem;
+  memset(y0, 0, (size_t)full->space.count * sizeof *y0);
+  for (int e = 0; e < fem->mesh->nt; e++) {
     double strain[6];
     ep_green_strain6(fem, e, u, strain);
-    for (int i = 0; i < count; i++) y[i] += ep_inner6(stress_at(full, i, e), strain);
+    for (int i = 0; i < full->space.count; i++) y0[i] += ep_inner6(stress_at(full, i, e), strain);
   }
-  for (int j = 0; w && j < space->k; j++)
-    w[j] = ep_dot((size_t)count, space->weights + (size_t)j * (size_t)count, y);
+}
+
+double ep_green_full_energy(ep_green_full *full, const double *u, double *y, double *f, double *w) {
+  const ep_fem *fem = full->space.fem;
+  const ep_green_problem problem = problem_of(full);
+  ep_green_solution solution = {.y = full->y,
+                                .w = full->w,
+                                .c = full->factor,
+                                .last = full->last,
+                                .a = full->ones,
+                                .trial_w = full->trial_w};
+  products(full, u, full->y0);
+  const double energy = ep_green_weights(&problem, full->y0, &solution);
+  memcpy(y, full->y, (size_t)problem.p * sizeof *y);
+  if (w) memcpy(w, full->w, (size_t)problem.k * sizeof *w);
   if (f) memset(f, 0, 3 * (size_t)fem->mesh->nv * sizeof *f);
-  for (int e = 0; f && e < nt; e++) {
+  for (int e = 0; f && e < fem->mesh->nt; e++) {
     double at[9], s[6];
     ep_fem_deformation(fem, e, u, at);
     combine(full, e, y, -2, s);
     add_force(fem, e, at, s, 1, f);
   }
-  return -ep_dot((size_t)count, y, y);
+  return energy;
 }
 
 // g_v . S g_w times the identity on every vertex block of tet e.
@@ -98,11 +140,20 @@ static void add_geometric(const ep_fem *fem, int e, const double s[6], ep_csr *k
   ep_fem_scatter_tangent(fem, e, 1, h, k);
 }
 
-void ep_green_full_stiffness(const ep_green_full *full, double alpha, const double *u,
-                             const double *y, ep_csr *k, double *columns) {
+// C at y, the identity without constraints.
+static void constraint_system(ep_green_full *full, const double *y) {
+  const ep_green_problem problem = problem_of(full);
+  const size_t p = (size_t)problem.p;
+  for (int j = 0; j < problem.k; j++) full->w[j] = ep_dot(p, problem.v + (size_t)j * p, y);
+  ep_green_system(&problem, full->w, full->system, full->ones);
+}
+
+void ep_green_full_stiffness(ep_green_full *full, double alpha, const double *u, const double *y,
+                             ep_csr *k, double *columns) {
   const ep_fem *fem = full->space.fem;
   const size_t n3 = 3 * (size_t)fem->mesh->nv, count = (size_t)full->space.count;
   memset(columns, 0, count * n3 * sizeof *columns);
+  constraint_system(full, y);
   for (int e = 0; e < fem->mesh->nt; e++) {
     double at[9], s[6];
     ep_fem_deformation(fem, e, u, at);
@@ -116,34 +167,57 @@ void ep_green_full_stiffness(const ep_green_full *full, double alpha, const doub
       if (fem->held[a]) columns[i * n3 + a] = 0;
 }
 
-ep_status ep_green_full_solve(const ep_green_full *full, double alpha, ep_factor *factor,
-                              const double *columns, const double *b, double *work, double *x,
-                              ep_error *err) {
+// solution (count) := matrix^-1 right; the matrix is kept.
+static ep_status solve_small(const ep_green_full *full, const double *matrix, double *right,
+                             ep_error *err) {
+  const size_t p = (size_t)full->space.count;
+  double *copy = malloc(p * p * sizeof *copy);
+  if (!copy) return no_memory(err);
+  memcpy(copy, matrix, p * p * sizeof *copy);
+  const ep_status status = ep_solve_spd((int)p, copy, 1, right, err);
+  free(copy);
+  return status;
+}
+
+ep_status ep_green_full_woodbury(ep_green_full *full, double alpha, ep_factor *factor,
+                                 const double *columns, double *work, ep_error *err) {
   const size_t n3 = 3 * (size_t)full->space.fem->mesh->nv, p = (size_t)full->space.count;
-  EP_TRY(ep_factor_solve(factor, 1, b, x, err));
-  if (alpha == 0) return EP_OK;
   for (size_t i = 0; i < p; i++) // Z_i = K^-1 J_i
     EP_TRY(ep_factor_solve(factor, 1, columns + i * n3, work + i * n3, err));
-  double *small = malloc((p * p + p) * sizeof *small);
-  if (!small) return no_memory(err);
-  double *right = small + p * p;
-  for (size_t i = 0; i < p; i++) {
+  for (size_t i = 0; i < p; i++)
     for (size_t j = 0; j < p; j++)
-      small[i * p + j] =
-          (i == j ? 0.5 / alpha : 0) - 0.5 * (ep_dot(n3, columns + i * n3, work + j * n3) +
-                                              ep_dot(n3, columns + j * n3, work + i * n3));
-    right[i] = ep_dot(n3, columns + i * n3, x);
-  }
-  const ep_status status = ep_solve_spd((int)p, small, 1, right, err);
-  for (size_t i = 0; i < p && status == EP_OK; i++) ep_axpy(n3, right[i], work + i * n3, x);
-  free(small);
-  return status;
+      full->small[i * p + j] =
+          0.5 * (full->system[i * p + j] / alpha - ep_dot(n3, columns + i * n3, work + j * n3) -
+                 ep_dot(n3, columns + j * n3, work + i * n3));
+  memset(full->last, 0, p * sizeof *full->last); // positive definite?
+  return solve_small(full, full->small, full->last, err);
+}
+
+ep_status ep_green_full_solve(const ep_green_full *full, ep_factor *factor, const double *columns,
+                              const double *work, const double *b, double *x, ep_error *err) {
+  const size_t n3 = 3 * (size_t)full->space.fem->mesh->nv, p = (size_t)full->space.count;
+  double *right = full->last;
+  EP_TRY(ep_factor_solve(factor, 1, b, x, err));
+  for (size_t i = 0; i < p; i++) right[i] = ep_dot(n3, columns + i * n3, x);
+  EP_TRY(solve_small(full, full->small, right, err));
+  for (size_t i = 0; i < p; i++) ep_axpy(n3, right[i], work + i * n3, x);
+  return EP_OK;
+}
+
+ep_status ep_green_full_subtract(const ep_green_full *full, double alpha, const double *columns,
+                                 const double *x, double *image, ep_error *err) {
+  const size_t n3 = 3 * (size_t)full->space.fem->mesh->nv, p = (size_t)full->space.count;
+  double *right = full->last;
+  for (size_t i = 0; i < p; i++) right[i] = ep_dot(n3, columns + i * n3, x);
+  EP_TRY(solve_small(full, full->system, right, err));
+  for (size_t i = 0; i < p; i++) ep_axpy(n3, -2 * alpha * right[i], columns + i * n3, image);
+  return EP_OK;
 }
 
 // ---- equilibrium -------------------------------------------------------------------------------
 
 typedef struct newton {
-  const ep_green_full *full;
+  ep_green_full *full;
   double alpha;
   const double *load;
   size_t n3;
@@ -195,9 +269,13 @@ static ep_status direction(newton *s, const double *u, ep_green_full_report *rep
   ep_fem_stiffness(fem, u, 0, &s->k);
   ep_green_full_stiffness(s->full, s->alpha, u, s->y, &s->k, s->columns);
   ep_status status = ep_factor_update(s->factor, &s->k, &indefinite);
-  if (status == EP_OK)
-    status = ep_green_full_solve(s->full, s->alpha, s->factor, s->columns, s->g, s->work, s->step,
-                                 &indefinite);
+  if (status == EP_OK && s->alpha == 0)
+    status = ep_factor_solve(s->factor, 1, s->g, s->step, &indefinite);
+  if (status == EP_OK && s->alpha > 0)
+    status = ep_green_full_woodbury(s->full, s->alpha, s->factor, s->columns, s->work, &indefinite);
+  if (status == EP_OK && s->alpha > 0)
+    status =
+        ep_green_full_solve(s->full, s->factor, s->columns, s->work, s->g, s->step, &indefinite);
   if (status == EP_ERR_NUMERIC) {
     report->projections++;
     ep_fem_stiffness(fem, u, 1, &s->k);
@@ -240,7 +318,7 @@ static ep_status iterate(newton *s, double *u, ep_green_full_report *report, ep_
                  report->residual, report->iterations);
 }
 
-ep_status ep_green_full_equilibrium(const ep_green_full *full, double alpha, const double *load,
+ep_status ep_green_full_equilibrium(ep_green_full *full, double alpha, const double *load,
                                     double *u, ep_green_full_report *report, ep_error *err) {
   newton s = {
       .full = full, .alpha = alpha, .load = load, .n3 = 3 * (size_t)full->space.fem->mesh->nv};

@@ -1,7 +1,8 @@
 // The full-space reference, reduced/bake/full_step.h. Claims:
 //  - in a complete basis (r = free unknowns) with all elements the reduced step is the full-space
 //    step, for every material, integrator and example force: the same equations, so equal to the
-//    tolerance of the two Newtons;
+//    tolerance of the two Newtons; also with the Green-strain path, alone and beside the
+//    interpolation, in its mixed form and with weak constraints;
 //  - errors fall with dt as order 1 (implicit Euler), 2 (Newmark), 2 (BDF2), full and reduced;
 //  - implicit Euler never adds energy: E(n+1) <= E(n) without load;
 //  - a body that nothing holds keeps its linear momentum, sum m v;
@@ -38,6 +39,7 @@ typedef struct complete {
   ep_csr mass, lb_mass, k0;
   ep_basis basis;
   double *phi, *pose; // (FUNCTIONS x n), (EXAMPLES x 3n)
+  ep_green_full green;
   ep_model_memory memory;
   void *block;
   ep_state *state;
@@ -104,22 +106,32 @@ static void make_examples(complete *c) {
       c->phi[f * c->b.mesh.nv + v] = cos((f + 1) * (c->b.mesh.x[3 * v] + 0.3 * f));
 }
 
-static void make_complete(complete *c, ep_material law, int examples) {
+// paths: EP bits of the examples' paths, LB = 1, GREEN = 2; 0: no examples.
+enum { LB = 1, GREEN = 2 };
+static void make_complete(complete *c, ep_material law, int paths) {
   *c = (complete){0};
+  ep_green_coefficients green = {0};
   make_bar(&c->b, CELLS, SIZE, law, SOFT, 1);
   ASSERT_OK(ep_fem_mass(&c->b.fem, &c->mass, err));
   ASSERT_OK(ep_fem_scalar_mass(&c->b.fem, &c->lb_mass, err));
   ASSERT_OK(ep_fem_rest_stiffness(&c->b.fem, &c->k0, err));
   make_basis(c);
   project_stiffness(c);
-  if (examples) make_examples(c);
+  if (paths) make_examples(c);
+  if (paths & GREEN) {
+    ASSERT_OK(ep_green_coefficients_compute(&c->b.fem, &c->basis, NULL, c->b.fem.volume, NULL, NULL,
+                                            &green, err));
+    ASSERT_OK(ep_green_full_create(&c->b.fem, c->b.fem.volume, EXAMPLES, c->pose, NULL, NULL,
+                                   &c->green, err));
+  }
   const int nt = c->b.mesh.nt;
   int *all = malloc((size_t)nt * sizeof *all);
   for (int e = 0; e < nt; e++) all[e] = e;
   const ep_lb lb = {.n = c->b.mesh.nv, .m = FUNCTIONS, .volume = 0.2, .phi = c->phi};
   const ep_model_parts parts = {.fem = &c->b.fem,
                                 .basis = &c->basis,
-                                .m = examples ? FUNCTIONS : 0,
+                                .m = paths & LB ? FUNCTIONS : 0,
+                                .green = paths & GREEN ? &green : NULL,
                                 .lb = &lb,
                                 .lb_mass = &c->lb_mass,
                                 .s = nt,
@@ -127,6 +139,7 @@ static void make_complete(complete *c, ep_material law, int examples) {
                                 .weight = c->b.fem.volume};
   ASSERT_OK(ep_model_build(&parts, &c->memory, err));
   free(all);
+  ep_green_coefficients_free(&green);
   const size_t bytes = (ep_state_bytes(&c->memory.model) + 63) / 64 * 64;
   c->block = aligned_alloc(64, bytes);
   assert_int_equal(ep_state_init(&c->memory.model, c->block, bytes, &c->state), EP_OK);
@@ -134,6 +147,7 @@ static void make_complete(complete *c, ep_material law, int examples) {
 
 static void free_complete(complete *c) {
   ep_model_memory_free(&c->memory);
+  ep_green_full_free(&c->green);
   ep_basis_free(&c->basis);
   ep_csr_free(&c->mass);
   ep_csr_free(&c->lb_mass);
@@ -179,7 +193,8 @@ static double difference_of_runs(complete *c, complete *guide, const ep_step_def
   const size_t n3 = c->b.n3, r = (size_t)c->basis.r;
   double *f = vector_of(n3), *fr = vector_of(r), worst = 0;
   ep_full *full;
-  ASSERT_OK(ep_full_create(&c->b.fem, guide ? guide->state : NULL, &full, err));
+  ASSERT_OK(ep_full_create(&c->b.fem, guide ? guide->state : NULL,
+                           c->green.stress ? &c->green : NULL, &full, err));
   ep_step_def def = *given;
   *moved = 0;
   for (int i = 0; i < steps; i++) {
@@ -208,6 +223,8 @@ static double difference_of_runs(complete *c, complete *guide, const ep_step_def
                 1e-7 * (1 + full_report.kinetic_energy));
     ASSERT_LESS(fabs(report.example_energy - full_report.example_energy),
                 1e-7 * (1 + full_report.example_energy));
+    ASSERT_LESS(fabs(report.green_energy - full_report.green_energy),
+                1e-7 * (1 + fabs(full_report.green_energy)));
   }
   ep_full_free(full);
   free(f), free(fr);
@@ -235,14 +252,48 @@ static void complete_basis_with_examples(void **state) {
   for (int force = 0; force < 2; force++) {
     complete c, guide;
     double moved;
-    make_complete(&c, EP_STABLE_NEOHOOKEAN, 1);
-    make_complete(&guide, EP_STABLE_NEOHOOKEAN, 1);
+    make_complete(&c, EP_STABLE_NEOHOOKEAN, LB);
+    make_complete(&guide, EP_STABLE_NEOHOOKEAN, LB);
     ep_step_def def = exact_step(EP_BDF2, 0.01);
     def.example_force = (ep_example_force)force;
     def.strength = 0.7, def.relief = 0.3;
     ASSERT_LESS(difference_of_runs(&c, &guide, &def, 25, &moved), 1e-8);
     ASSERT_LESS(0.02, moved);
     ASSERT_LESS(1e-3, ep_state_weights(c.state)[0] + ep_state_weights(c.state)[1]);
+    free_complete(&c);
+    free_complete(&guide);
+  }
+}
+
+// StVK, StVK with volume penalty, and the mixed form; without and with weak constraints.
+static void complete_basis_with_strains(void **state) {
+  (void)state;
+  static const ep_material laws[] = {EP_STVK, EP_STVK_VOLUME, EP_STABLE_NEOHOOKEAN};
+  static const ep_green greens[] = {{0.9, 0, 0}, {0.8, 0.5, 4}};
+  for (int i = 0; i < 6; i++) {
+    complete c;
+    double moved;
+    make_complete(&c, laws[i / 2], GREEN);
+    ep_step_def def = exact_step((ep_integrator)(i % EP_INTEGRATORS), 0.01);
+    def.green = greens[i % 2];
+    ASSERT_LESS(difference_of_runs(&c, NULL, &def, 25, &moved), 1e-8);
+    ASSERT_LESS(0.02, moved);
+    ASSERT_LESS(1e-3, fabs(ep_state_green_weights(c.state)[0]));
+    free_complete(&c);
+  }
+}
+
+static void complete_basis_with_both_paths(void **state) {
+  (void)state;
+  for (int law = 0; law < 2; law++) {
+    complete c, guide;
+    double moved;
+    make_complete(&c, law ? EP_STABLE_NEOHOOKEAN : EP_STVK, LB | GREEN);
+    make_complete(&guide, law ? EP_STABLE_NEOHOOKEAN : EP_STVK, LB);
+    ep_step_def def = exact_step(EP_IMPLICIT_EULER, 0.01);
+    def.strength = 0.7, def.relief = 0.3, def.green = (ep_green){0.9, 0.2, 2};
+    ASSERT_LESS(difference_of_runs(&c, &guide, &def, 25, &moved), 1e-8);
+    ASSERT_LESS(0.02, moved);
     free_complete(&c);
     free_complete(&guide);
   }
@@ -257,7 +308,7 @@ static void run_to_end(const bar *b, ep_integrator integrator, double dt, double
   ep_step_def def = exact_step(integrator, dt);
   def.tolerance = 1e-8; // round-off of the first steps' small forces; far below the errors in dt
   def.force = f;
-  ASSERT_OK(ep_full_create(&b->fem, NULL, &full, err));
+  ASSERT_OK(ep_full_create(&b->fem, NULL, NULL, &full, err));
   for (int i = 0; i < (int)lround(0.4 / dt); i++) {
     load_at(b, (i + 1) * dt, f);
     ASSERT_OK(ep_full_step(full, &def, NULL, err));
@@ -328,7 +379,7 @@ static void euler_never_adds_energy(void **state) {
     bar b;
     ep_full *full;
     make_bar(&b, CELLS, SIZE, (ep_material)law, SOFT, 1);
-    ASSERT_OK(ep_full_create(&b.fem, NULL, &full, err));
+    ASSERT_OK(ep_full_create(&b.fem, NULL, NULL, &full, err));
     double *u = ep_full_displacement(full);
     for (int v = 0; v < b.mesh.nv; v++) { // squeezed to .45 of its length and sheared
       u[3 * v] = -0.55 * b.mesh.x[3 * v];
@@ -370,7 +421,7 @@ static void free_body_keeps_momentum(void **state) {
     double before[3], after[3];
     make_bar(&b, CELLS, SIZE, EP_COROTATIONAL, SOFT, 0);
     ASSERT_OK(ep_fem_mass(&b.fem, &mass, err));
-    ASSERT_OK(ep_full_create(&b.fem, NULL, &full, err));
+    ASSERT_OK(ep_full_create(&b.fem, NULL, NULL, &full, err));
     smooth_random(&b, 5, 0.8, ep_full_velocity(full));
     momentum(&b, &mass, ep_full_velocity(full), before);
     ep_step_def def = exact_step((ep_integrator)kind, 0.01);
@@ -391,7 +442,7 @@ static void failure_changes_nothing(void **state) {
   ep_full *full;
   make_bar(&b, CELLS, SIZE, EP_STABLE_NEOHOOKEAN, SOFT, 1);
   double *f = vector_of(b.n3), *u = vector_of(b.n3), *v = vector_of(b.n3);
-  ASSERT_OK(ep_full_create(&b.fem, NULL, &full, err));
+  ASSERT_OK(ep_full_create(&b.fem, NULL, NULL, &full, err));
   ep_step_def def = exact_step(EP_NEWMARK, 0.01);
   def.force = f;
   load_at(&b, 0.2, f);
@@ -418,6 +469,8 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(complete_basis_is_full_space),
       cmocka_unit_test(complete_basis_with_examples),
+      cmocka_unit_test(complete_basis_with_strains),
+      cmocka_unit_test(complete_basis_with_both_paths),
       cmocka_unit_test(full_orders_in_time),
       cmocka_unit_test(reduced_orders_in_time),
       cmocka_unit_test(euler_never_adds_energy),

@@ -104,51 +104,57 @@ static void weights_equal_a_dense_solve(void **state) {
 
 // ---- derivatives -------------------------------------------------------------------------------
 
-// (sparse part - 2 columns^T columns) d
-static void apply(const scene *s, const ep_csr *k, const double *columns, const double *d,
-                  double *out) {
+// (sparse part - 2 alpha columns^T C^-1 columns) d
+static void apply(const scene *s, double alpha, const ep_csr *k, const double *columns,
+                  const double *d, double *out) {
   ep_csr_multiply(k, 1, d, out);
-  for (int i = 0; i < s->full.space.count; i++) {
-    const double *c = columns + (size_t)i * s->b.n3;
-    double dot = 0;
-    for (size_t a = 0; a < s->b.n3; a++) dot += c[a] * d[a];
-    for (size_t a = 0; a < s->b.n3; a++) out[a] -= 2 * dot * c[a];
-  }
+  ASSERT_OK(ep_green_full_subtract(&s->full, alpha, columns, d, out, err));
 }
 
-static void derivatives_match_differences(void **state) {
-  (void)state;
+// W_a is quartic while the set of negative weights stays: central differences have order 2.
+static void check_derivatives(ep_green weak, int negative) {
   scene s;
   create(&s, K, 0);
   build(&s, K, NULL, NULL);
+  s.full.weak = weak;
   const size_t n3 = s.b.n3;
   double *v = vector_of(8 * n3), *u = v, *d = v + n3, *f = v + 2 * n3, *hd = v + 3 * n3;
   double *plus = v + 4 * n3, *fp = v + 5 * n3, *minus = v + 6 * n3, *fm = v + 7 * n3, y[K];
-  double *columns = vector_of(K * n3), error[2][2];
+  double *columns = vector_of(K * n3), error[2][2], w[K], wd[K];
   ep_csr k;
   ASSERT_OK(ep_csr_from_tets(s.b.mesh.nv, s.b.mesh.nt, s.b.mesh.tet, 3, &k, err));
   smooth_random(&s.b, 1, 0.3, u);
-  smooth_random(&s.b, 2, 0.3, d);
-  ep_green_full_energy(&s.full, u, y, f, NULL);
+  smooth_random(&s.b, 2, negative ? 0.06 : 0.3, d);
+  ep_green_full_energy(&s.full, u, y, f, w);
   ep_green_full_stiffness(&s.full, 1, u, y, &k, columns);
-  apply(&s, &k, columns, d, hd);
+  apply(&s, 1, &k, columns, d, hd);
   double slope = 0;
+  int below = 0;
   for (size_t a = 0; a < n3; a++) slope += f[a] * d[a];
+  for (int j = 0; j < K; j++) below += w[j] < 0;
+  if (negative) assert_true(below > 0); // else the penalty is not tested
   for (int level = 0; level < 2; level++) {
     const double t = level ? 0.05 : 0.1;
     for (size_t a = 0; a < n3; a++) plus[a] = u[a] + t * d[a], minus[a] = u[a] - t * d[a];
-    const double wp = ep_green_full_energy(&s.full, plus, y, fp, NULL);
-    const double wm = ep_green_full_energy(&s.full, minus, y, fm, NULL);
+    const double wp = ep_green_full_energy(&s.full, plus, y, fp, wd);
+    for (int j = 0; negative && j < K; j++) assert_int_equal(wd[j] < 0, w[j] < 0);
+    const double wm = ep_green_full_energy(&s.full, minus, y, fm, wd);
+    for (int j = 0; negative && j < K; j++) assert_int_equal(wd[j] < 0, w[j] < 0);
     error[level][0] = fabs((wp - wm) / (2 * t) - slope);
     for (size_t a = 0; a < n3; a++) fp[a] = (fp[a] - fm[a]) / (2 * t);
     error[level][1] = distance_of(n3, fp, hd);
   }
-  for (int i = 0; i < 2; i++)
-    ASSERT_LESS(fabs(order_of(error[0][i], error[1][i]) - 2), 0.1); // W_a is quartic: order 2
+  for (int i = 0; i < 2; i++) ASSERT_LESS(fabs(order_of(error[0][i], error[1][i]) - 2), 0.1);
   free(v);
   free(columns);
   ep_csr_free(&k);
   drop(&s);
+}
+
+static void derivatives_match_differences(void **state) {
+  (void)state;
+  check_derivatives((ep_green){0}, 0);
+  check_derivatives((ep_green){.sum_to_one = 0.7, .non_negative = 5}, 1);
 }
 
 // ---- invariance --------------------------------------------------------------------------------
@@ -292,14 +298,15 @@ static void regions_act_alone_and_together(void **state) {
   drop(&s);
 }
 
-// ---- solve and equilibrium
-// -----------------------------------------------------------------------
+// ---- solve and equilibrium ---------------------------------------------------------------------
 
 static void woodbury_solves_the_operator(void **state) {
   (void)state;
   scene s;
   create(&s, K, 1);
   build(&s, K, NULL, NULL);
+  // C is not the identity; little of sum_to_one, or its pull makes K indefinite
+  s.full.weak = (ep_green){.sum_to_one = 0.01, .non_negative = 3};
   const size_t n3 = s.b.n3;
   const double alpha = 0.8;
   double *v = vector_of(4 * n3), *u = v, *b = v + n3, *x = v + 2 * n3, *back = v + 3 * n3, y[K];
@@ -313,9 +320,9 @@ static void woodbury_solves_the_operator(void **state) {
   ep_green_full_energy(&s.full, u, y, NULL, NULL);
   ep_green_full_stiffness(&s.full, alpha, u, y, &k, columns);
   ASSERT_OK(ep_factor_create(&k, s.b.fem.held, 1, &factor, err));
-  ASSERT_OK(ep_green_full_solve(&s.full, alpha, factor, columns, b, work, x, err));
-  for (size_t a = 0; a < K * n3; a++) columns[a] *= sqrt(alpha);
-  apply(&s, &k, columns, x, back);
+  ASSERT_OK(ep_green_full_woodbury(&s.full, alpha, factor, columns, work, err));
+  ASSERT_OK(ep_green_full_solve(&s.full, factor, columns, work, b, x, err));
+  apply(&s, alpha, &k, columns, x, back);
   for (size_t a = 0; a < n3; a++)
     if (s.b.fem.held[a]) back[a] = b[a] = 0;
   ASSERT_LESS(distance_of(n3, back, b), 1e-9 * norm_of(n3, b)); // condition of K: below 1e5
