@@ -58,6 +58,11 @@ ep_status ep_bake_compute(ep_bake *bake, ep_bake_step *step, ep_error *err) {
   return EP_OK;
 }
 
+ep_status ep_bake_status(const ep_stage *stage, ep_status status, ep_error *err) {
+  if (status == EP_OK || strncmp(err->text, "stage ", 6) == 0) return status;
+  return ep_fail_context(err, "stage %s", stage->name);
+}
+
 void ep_bake_end(ep_bake_step *step) {
   ep_artifact_close(&step->artifact);
   step->stage->seconds = ep_seconds() - step->started;

@@ -83,6 +83,8 @@ void ep_bake_reject(ep_bake *bake, ep_bake_step *step);
 // To be called before computing, after what the stage builds on is there: starts PETSc once.
 ep_status ep_bake_compute(ep_bake *bake, ep_bake_step *step, ep_error *err);
 void ep_bake_end(ep_bake_step *step);
+// The status of a stage as it goes up: a failure names the stage it happened in, and only that one.
+ep_status ep_bake_status(const ep_stage *stage, ep_status status, ep_error *err);
 // Copy count doubles or ints out of the artifact into new memory; false where they are not there.
 bool ep_bake_take(const ep_bake_step *step, const char *name, size_t count, double **out);
 bool ep_bake_take_int(const ep_bake_step *step, const char *name, size_t count, int **out);

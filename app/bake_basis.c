@@ -12,7 +12,7 @@ static size_t unknowns(const ep_bake *bake) {
 }
 
 static ep_status failed(ep_status status, const ep_stage *stage, ep_error *err) {
-  return status == EP_OK ? EP_OK : ep_fail_context(err, "stage %s", stage->name);
+  return ep_bake_status(stage, status, err);
 }
 
 ep_status ep_bake_fem(ep_bake *bake, ep_error *err) {

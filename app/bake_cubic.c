@@ -33,5 +33,5 @@ ep_status ep_bake_cubic(ep_bake *bake, ep_error *err) {
     ep_bake_reject(bake, &step);
   if (!step.found) status = compute(bake, &step, err);
   ep_bake_end(&step);
-  return status == EP_OK ? EP_OK : ep_fail_context(err, "stage %s", stage->name);
+  return ep_bake_status(stage, status, err);
 }

@@ -50,7 +50,7 @@ ep_status ep_bake_lb(ep_bake *bake, int shape, ep_error *err) {
   if (step.found && !take_lb(&step, mesh->nv, &bake->lb[shape])) ep_bake_reject(bake, &step);
   if (!step.found) status = compute_lb(bake, &step, shape, err);
   ep_bake_end(&step);
-  return status == EP_OK ? EP_OK : ep_fail_context(err, "stage %s", stage->name);
+  return ep_bake_status(stage, status, err);
 }
 
 // ---- maps ------------------------------------------------------------------------------------
@@ -130,5 +130,5 @@ ep_status ep_bake_map(ep_bake *bake, ep_stage *stage, const ep_map **out, ep_err
     ep_bake_reject(bake, &step);
   if (!step.found) status = compute_map(bake, &step, map, err);
   ep_bake_end(&step);
-  return status == EP_OK ? EP_OK : ep_fail_context(err, "stage %s", stage->name);
+  return ep_bake_status(stage, status, err);
 }

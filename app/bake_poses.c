@@ -377,5 +377,5 @@ ep_status ep_bake_poses(ep_bake *bake, ep_error *err) {
   if (step.found && !take_poses(bake, &step)) ep_bake_reject(bake, &step);
   if (!step.found) status = compute_poses(bake, &step, err);
   ep_bake_end(&step);
-  return status == EP_OK ? EP_OK : ep_fail_context(err, "stage %s", stage->name);
+  return ep_bake_status(stage, status, err);
 }

@@ -16,8 +16,9 @@ static ep_status command_bake(const ep_cli *cli, ep_session *session, ep_bake *b
   EP_TRY(ep_bake_model(bake, path, err));
   EP_TRY(ep_bake_poses(bake, err)); // for the report: a model in the cache does not ask for them
   if (cli->json)
-    return ep_report_print(json_pack("{s:s, s:s, s:o, s:o}", "scene", session->scene.name, "model",
-                                     path, "stages", ep_report_stages(&session->plan), "examples",
+    return ep_report_print(json_pack("{s:s, s:s, s:i, s:o, s:o}", "scene", session->scene.name,
+                                     "model", path, "warnings", session->log.warnings, "stages",
+                                     ep_report_stages(&session->plan), "examples",
                                      ep_poses_json(bake)),
                            err);
   for (int i = 0; i < session->plan.count; i++) {

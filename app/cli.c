@@ -32,7 +32,8 @@ enum {
   KEY_QUIET = 'q',
   KEY_JSON = 'j',
   KEY_SET = 'S',
-  KEY_CACHE = 'c'
+  KEY_CACHE = 'c',
+  KEY_SERVED = 0x100
 };
 
 #define OPTION_JSON                                                                                \
@@ -68,7 +69,12 @@ static const struct argp_option align_options[] = {
     OPTION_CACHE,
     {0}};
 static const struct argp_option scene_options[] = {
-    OPTION_JSON, OPTION_QUIET, OPTION_SET, OPTION_CACHE, {0}};
+    OPTION_JSON,
+    OPTION_QUIET,
+    OPTION_SET,
+    OPTION_CACHE,
+    {"served", KEY_SERVED, 0, OPTION_HIDDEN, NULL, 0},
+    {0}};
 static const struct argp_option run_options[] = {
     {"out", KEY_OUT, "DIR", 0, "Folder of the results (default: out/NAME)", 0},
     OPTION_JSON,
@@ -139,6 +145,9 @@ static error_t take(int key, char *arg, struct argp_state *state) {
   case KEY_QUIET:
     cli->quiet = true;
     return 0;
+  case KEY_SERVED:
+    cli->served = true;
+    return 0;
   case KEY_SET:
     return take_set(cli, arg, state);
   case ARGP_KEY_ARG:
@@ -193,7 +202,7 @@ void ep_cli_parse(int argc, char **argv, ep_cli *out) {
 }
 
 int ep_cli_fail(const ep_cli *cli, const ep_error *err) {
-  fprintf(stderr, "eigenpose: %s\n", err->text);
+  if (!cli->served) fprintf(stderr, "eigenpose: %s\n", err->text);
   if (cli->json) {
     json_t *root = json_pack("{s:{s:s, s:s}}", "error", "status", ep_status_name(err->status),
                              "message", err->text);

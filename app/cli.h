@@ -26,6 +26,7 @@ typedef struct ep_cli {
   const char *out, *cache;
   int count; // eigen: eigenpairs wanted
   bool json, quiet;
+  bool served; // run by the command, which reports in its place what both would say
   int nsets;
   const char *set[EP_SETS_MAX];
 } ep_cli;

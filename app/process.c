@@ -44,6 +44,7 @@ static _Noreturn void child(const char *path, const ep_cli *cli, int output) {
   argv[n++] = path;
   argv[n++] = "bake";
   argv[n++] = "--json";
+  argv[n++] = "--served";
   if (cli->quiet) argv[n++] = "--quiet";
   if (cli->cache) {
     argv[n++] = "--cache";

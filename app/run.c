@@ -56,6 +56,8 @@ static ep_status get_model(const ep_cli *cli, ep_session *session, ep_model_file
   }
   json_t *report;
   EP_TRY(ep_baker_run(cli, &report, err));
+  session->log.warnings +=
+      (int)json_integer_value(json_object_get(report, "warnings")); // said by the baker
   const bool good = ep_report_take_stages(&session->plan, json_object_get(report, "stages"));
   json_decref(report);
   if (!good) return ep_fail(err, EP_ERR_FORMAT, "the baker's report cannot be read");

@@ -4,7 +4,8 @@ ep_status ep_session_open(const ep_cli *cli, ep_session *out, ep_error *err) {
   *out = (ep_session){.log = ep_log_default(cli->quiet)};
   ep_status status = ep_cache_open(cli->cache, &out->cache, err);
   if (status == EP_OK) status = ep_scene_read(cli->input, cli->nsets, cli->set, &out->scene, err);
-  if (status == EP_OK) status = ep_shapes_read(&out->scene, &out->log, &out->shapes, err);
+  if (status == EP_OK)
+    status = ep_shapes_read(&out->scene, cli->served ? NULL : &out->log, &out->shapes, err);
   if (status == EP_OK) status = ep_plan_make(&out->scene, &out->shapes, &out->plan, err);
   if (status != EP_OK) ep_session_close(out);
   return status;
