@@ -18,6 +18,7 @@
 
 #include "base/files.h"
 #include "box.h"
+#include "program.h"
 
 static const char scene_text[] =
     "schema: 1\nname: beam\nobject: {mesh: beam.veg}\n"
@@ -30,43 +31,8 @@ static const char scene_text[] =
     "loads: [{push: {box: {low: [0.9, -1, -1], high: [2, 2, 2]}, force: [0, 6, 0], ramp: 0.2}}]\n"
     "output: {every: 10}\n";
 
-// Run the program; stdout goes to out.txt, stderr to err.txt. Returns the exit code.
-static int command(const char *format, ...) __attribute__((format(printf, 1, 2)));
-static int command(const char *format, ...) {
-  char line[4096];
-  const int used = snprintf(line, sizeof line, "%s ", EP_COMMAND);
-  va_list args;
-  va_start(args, format);
-  vsnprintf(line + used, sizeof line - (size_t)used, format, args);
-  va_end(args);
-  strncat(line, " >out.txt 2>err.txt", sizeof line - strlen(line) - 1);
-  const int status = system(line);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
-
-static char *text_of(const char *path) {
-  char *text;
-  size_t size;
-  ep_error err = {0};
-  if (ep_file_read(path, &text, &size, &err) != EP_OK) fail_msg("%s", err.text);
-  return text;
-}
-
-static json_t *report(void) {
-  json_error_t trouble;
-  json_t *root = json_load_file("out.txt", 0, &trouble); // refuses anything after the object
-  if (!root) fail_msg("stdout is no JSON object: %s\n%s", trouble.text, text_of("err.txt"));
-  return root;
-}
-
-static double number(const json_t *root, const char *key) {
-  const json_t *value = json_object_get(root, key);
-  if (!json_is_number(value)) fail_msg("no number '%s'", key);
-  return json_number_value(value);
-}
-
 static json_t *run_scene(const char *cache, const char *more) {
-  const int code = command("run beam.yaml --json --out results --cache %s %s", cache, more);
+  const int code = program("", "run beam.yaml --json --out results --cache %s %s", cache, more);
   if (code != 0) fail_msg("exit code %d: %s", code, text_of("err.txt"));
   return report();
 }
@@ -147,8 +113,8 @@ static void the_second_run_bakes_nothing(void **state) {
 
 static void two_bakes_are_byte_identical(void **state) {
   (void)state;
-  assert_int_equal(command("bake beam.yaml --cache cache-b --json"), 0);
-  assert_int_equal(command("bake beam.yaml --cache cache-c --json"), 0);
+  assert_int_equal(program("", "bake beam.yaml --cache cache-b --json"), 0);
+  assert_int_equal(program("", "bake beam.yaml --cache cache-c --json"), 0);
   assert_int_equal(system("diff -r cache-b cache-c"), 0);
   assert_int_equal(system("test $(ls cache-b | wc -l) -eq 7"), 0);
 }
@@ -170,7 +136,7 @@ static void damaged_results_are_baked_again(void **state) {
 }
 
 static void expect_failure(int code, const char *part, const char *arguments) {
-  const int got = command("%s", arguments);
+  const int got = program("", "%s", arguments);
   char *err = text_of("err.txt");
   if (got != code || !strstr(err, part))
     fail_msg("%s: exit code %d (expected %d), '%s' (expected '%s')", arguments, got, code, err,
@@ -197,7 +163,7 @@ static void mistakes_have_documented_exit_codes(void **state) {
 
 static void failures_are_json_too(void **state) {
   (void)state;
-  assert_int_equal(command("run free.yaml --json"), 9);
+  assert_int_equal(program("", "run free.yaml --json"), 9);
   json_t *root = report();
   const json_t *failure = json_object_get(root, "error");
   assert_string_equal(json_string_value(json_object_get(failure, "status")), "unsupported");
@@ -219,7 +185,7 @@ static void a_full_disk_is_said(void **state) {
 
 static void eigenvalues_and_plans_are_printed(void **state) {
   (void)state;
-  assert_int_equal(command("eigen beam.veg --count 5 --json --out phi.vtu"), 0);
+  assert_int_equal(program("", "eigen beam.veg --count 5 --json --out phi.vtu"), 0);
   json_t *root = report();
   const json_t *list = json_object_get(root, "eigenvalues");
   assert_int_equal(json_array_size(list), 5);
@@ -234,17 +200,17 @@ static void eigenvalues_and_plans_are_printed(void **state) {
   assert_true(first > 9.8 && first < 10.2);
   json_decref(root);
   assert_true(ep_path_exists("phi.vtu"));
-  assert_int_equal(command("plan beam.yaml --json --cache cache-c"), 0);
+  assert_int_equal(program("", "plan beam.yaml --json --cache cache-c"), 0);
   root = report();
   assert_true(json_array_size(json_object_get(root, "stages")) >= 8);
   json_decref(root);
-  assert_int_equal(command("align beam.yaml --json --cache cache-c"), 0);
+  assert_int_equal(program("", "align beam.yaml --json --cache cache-c"), 0);
   root = report();
   assert_int_equal(json_array_size(json_object_get(root, "maps")), 0);
   json_decref(root);
-  assert_int_equal(command("--help"), 0);
-  assert_int_equal(command("run --help"), 0);
-  assert_int_equal(command("--version"), 0);
+  assert_int_equal(program("", "--help"), 0);
+  assert_int_equal(program("", "run --help"), 0);
+  assert_int_equal(program("", "--version"), 0);
 }
 
 static int set_up(void **state) {
