@@ -220,6 +220,9 @@ static ep_status write_model(ep_bake *bake, const char *path, ep_error *err) {
   EP_TRY(ep_bake_green(bake, err));
   EP_TRY(ep_bake_cubic(bake, err));
   if (examples) EP_TRY(ep_bake_lb(bake, 0, err));
+  ep_contact_tree tree = {.contacts = 0};
+  if (bake->scene->nobstacles)
+    EP_TRY(ep_contact_tree_build(bake->fem.mesh, bake->basis.r, bake->basis.u, &tree, err));
   const ep_model_parts parts = {
       .fem = &bake->fem,
       .basis = &bake->basis,
@@ -231,10 +234,13 @@ static ep_status write_model(ep_bake *bake, const char *path, ep_error *err) {
       .weight = bake->cubature.weight,
       .green = bake->green.b ? &bake->green : NULL,
       .cubic = bake->cubic,
+      .contact = tree.contacts ? &tree : NULL,
       .precision = bake->scene->evaluator == EP_EVALUATE_CUBIC_FLOAT ? EP_FLOAT : EP_DOUBLE,
   };
   ep_model_memory memory;
-  EP_TRY(ep_model_build(&parts, &memory, err));
+  const ep_status built = ep_model_build(&parts, &memory, err);
+  ep_contact_tree_free(&tree);
+  if (built != EP_OK) return built;
   char train[40], held_out[40];
   snprintf(train, sizeof train, "%.17g", bake->cubature.train_error);
   snprintf(held_out, sizeof held_out, "%.17g", bake->cubature.held_out_error);
@@ -253,7 +259,7 @@ static ep_status write_model(ep_bake *bake, const char *path, ep_error *err) {
 static void settle(ep_plan *plan) {
   for (int i = 0; i < plan->count; i++) {
     ep_stage *stage = &plan->stage[i];
-    if (stage->runs && stage->kind != EP_STAGE_TARGET && stage->seconds == 0) stage->cached = true;
+    if (stage->runs && ep_stage_is_baked(stage->kind) && stage->seconds == 0) stage->cached = true;
   }
 }
 

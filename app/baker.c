@@ -23,7 +23,7 @@ static ep_status command_bake(const ep_cli *cli, ep_session *session, ep_bake *b
                            err);
   for (int i = 0; i < session->plan.count; i++) {
     const ep_stage *stage = &session->plan.stage[i];
-    if (stage->runs && stage->kind != EP_STAGE_TARGET)
+    if (stage->runs && ep_stage_is_baked(stage->kind))
       printf("%-30s %8.3f s%s\n", stage->name, stage->seconds, stage->cached ? "  (cached)" : "");
   }
   printf("model: %s\n", path);

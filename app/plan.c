@@ -14,6 +14,7 @@ static const int stage_version[] = {
     [EP_STAGE_EIGEN] = 1, [EP_STAGE_MAP] = 2,   [EP_STAGE_POSES] = 3,    [EP_STAGE_MODES] = 1,
     [EP_STAGE_PATHS] = 2, [EP_STAGE_BASIS] = 1, [EP_STAGE_CUBATURE] = 1, [EP_STAGE_GREEN] = 1,
     [EP_STAGE_MODEL] = 4, [EP_STAGE_CUBIC] = 1, [EP_STAGE_TARGET] = 1,
+    [EP_STAGE_CONTACT] = 1,
 };
 
 // Matching raises the number of functions to 20 (DESIGN "Maps"), coupling uses 2 m.
@@ -31,9 +32,13 @@ const char *ep_stage_kind_name(ep_stage_kind kind) {
       [EP_STAGE_EIGEN] = "eigen",          [EP_STAGE_MAP] = "map",     [EP_STAGE_POSES] = "poses",
       [EP_STAGE_MODES] = "modes",          [EP_STAGE_PATHS] = "paths", [EP_STAGE_BASIS] = "basis",
       [EP_STAGE_CUBATURE] = "cubature",    [EP_STAGE_MODEL] = "model", [EP_STAGE_CUBIC] = "cubic",
-      [EP_STAGE_TARGET] = "interpolation", [EP_STAGE_GREEN] = "green",
+      [EP_STAGE_TARGET] = "interpolation", [EP_STAGE_CONTACT] = "contact", [EP_STAGE_GREEN] = "green",
   };
   return names[kind];
+}
+
+bool ep_stage_is_baked(ep_stage_kind kind) {
+  return kind != EP_STAGE_TARGET && kind != EP_STAGE_CONTACT;
 }
 
 // Add a stage; its name is the kind, with ":detail" where detail is given.
@@ -355,6 +360,7 @@ static void plan_model(planner *p) {
   add_stage_key(p, &text, EP_STAGE_GREEN);
   add_stage_key(p, &text, EP_STAGE_CUBIC);
   if (is_cubic(p)) ep_hash_add(&text, "evaluator %d", (int)p->scene->evaluator);
+  if (p->scene->nobstacles) ep_hash_add(&text, "contact");
   stage->key = ep_hash_done(&text);
 }
 
@@ -370,6 +376,15 @@ static void plan_target(planner *p) {
   else
     add(p, EP_STAGE_TARGET, NULL, true, "%d example%s and the rest shape, in every step", k,
         k > 1 ? "s" : "");
+}
+
+static void plan_contact(planner *p) {
+  const int count = p->scene->nobstacles;
+  if (!count)
+    add(p, EP_STAGE_CONTACT, NULL, false, "no obstacles: surface rows and their tree are not kept");
+  else
+    add(p, EP_STAGE_CONTACT, NULL, true, "%d obstacle%s, in every step", count,
+        count > 1 ? "s" : "");
 }
 
 static ep_status fill(planner *p) {
@@ -391,13 +406,14 @@ static ep_status fill(planner *p) {
   plan_green(p);
   plan_model(p);
   plan_target(p);
+  plan_contact(p);
   return EP_OK;
 }
 
 ep_status ep_plan_make(const ep_scene *scene, const ep_shapes *shapes, ep_plan *out,
                        ep_error *err) {
   memset(out, 0, sizeof *out);
-  const size_t most = (size_t)shapes->count + 2 * (size_t)shapes->examples + 11;
+  const size_t most = (size_t)shapes->count + 2 * (size_t)shapes->examples + 12;
   out->stage = calloc(most, sizeof *out->stage);
   if (!out->stage) return ep_fail(err, EP_ERR_MEMORY, "no memory for the plan");
   planner p = {.scene = scene, .shapes = shapes, .plan = out, .err = err};

@@ -19,6 +19,7 @@ typedef enum ep_stage_kind {
   EP_STAGE_CUBIC,    // coefficients of the exact polynomials
   EP_STAGE_MODEL,    // the .epm file
   EP_STAGE_TARGET,   // run time: interpolation of the examples in every step
+  EP_STAGE_CONTACT,  // run time: contact with obstacles in every step
 } ep_stage_kind;
 
 typedef struct ep_stage {
@@ -51,6 +52,8 @@ ep_stage *ep_plan_find(const ep_plan *plan, ep_stage_kind kind);
 // The LB space of a shape; the map between two shapes. NULL where there is none.
 ep_stage *ep_plan_eigen(const ep_plan *plan, int shape);
 ep_stage *ep_plan_map(const ep_plan *plan, int from, int to);
+// 0 for what only happens in the steps of a run.
+bool ep_stage_is_baked(ep_stage_kind kind);
 // What a kind is called ("eigen", "map", ...).
 const char *ep_stage_kind_name(ep_stage_kind kind);
 

@@ -17,7 +17,7 @@ json_t *ep_json_numbers(int count, const double *value) {
 }
 
 static bool baked(const ep_stage *stage) {
-  return stage->runs && stage->kind != EP_STAGE_TARGET;
+  return stage->runs && ep_stage_is_baked(stage->kind);
 }
 
 json_t *ep_report_stages(const ep_plan *plan) {

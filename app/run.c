@@ -14,7 +14,7 @@
 
 static bool is_cached(const ep_session *session, const ep_stage *stage) {
   char path[EP_PATH_MAX];
-  if (!stage->runs || stage->kind == EP_STAGE_TARGET) return false;
+  if (!stage->runs || !ep_stage_is_baked(stage->kind)) return false;
   ep_cache_path(&session->cache, stage->name, &stage->key,
                 stage->kind == EP_STAGE_MODEL ? "epm" : "ept", path);
   return ep_path_exists(path);

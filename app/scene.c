@@ -215,6 +215,7 @@ static ep_status convert(const ep_scene_reader *r, const raw_scene *raw, ep_scen
   EP_TRY(read_reduction(r, raw->reduction, out));
   EP_TRY(read_simulation(r, raw->simulation, out));
   EP_TRY(read_loads(r, raw, out));
+  EP_TRY(ep_read_contact(r, raw, out));
   EP_TRY(read_examples(r, raw->examples, out));
   EP_TRY(read_output(r, raw->output, out));
   return ep_read_sweep(r, raw->compare, out);
@@ -268,6 +269,8 @@ void ep_scene_free(ep_scene *scene) {
     free(scene->region[i].where.path);
   }
   free(scene->region);
+  for (int i = 0; i < scene->nobstacles; i++) free(scene->obstacle[i].motion.key);
+  free(scene->obstacle);
   free(scene->fixed);
   free(scene->load);
   free(scene->family);

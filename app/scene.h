@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "app/motion.h"
 #include "base/error.h"
 #include "mesh/mesh.h"
 #include "reduced/eigenpose.h"
@@ -69,6 +70,15 @@ typedef struct ep_load {
   double from, until, ramp; // [s]
 } ep_load;
 
+// A plane, sphere or box in the way, moving or not.
+typedef struct ep_scene_obstacle {
+  ep_obstacle_kind kind;
+  double size[3]; // as in reduced/obstacle.h
+  double friction;
+  ep_frame at; // where it stands at first
+  ep_motion_path motion;
+} ep_scene_obstacle;
+
 // What `eigenpose compare` sweeps (docs/scene.md).
 typedef enum ep_method {
   EP_METHOD_CUBATURE, // reduced, s trained elements
@@ -120,6 +130,9 @@ typedef struct ep_scene {
   char algorithm[48]; // NLopt's name of it
   int nloads;
   ep_load *load;
+  int nobstacles;
+  ep_scene_obstacle *obstacle;
+  ep_contact_def contact;
   int every;
   unsigned formats;
   ep_sweep sweep;

@@ -43,6 +43,12 @@ ep_status ep_read_regions(const ep_scene_reader *r, const raw_scene *raw, ep_sce
 ep_status ep_read_family_region(const ep_scene_reader *r, const char *key, const char *family,
                                 const raw_region *raw, ep_scene *scene, int *number);
 ep_status ep_read_families(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out);
+ep_status ep_read_contact(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out);
+// raw NULL: no turn.
+ep_status ep_read_turn(const ep_scene_reader *r, const char *key, const raw_turn *raw,
+                       ep_turn *out);
+ep_status ep_read_motion(const ep_scene_reader *r, const char *key, unsigned count,
+                         const raw_keyframe *raw, const bool *smooth, ep_motion_path *out);
 // After everything else of the scene: the defaults come from there.
 ep_status ep_read_sweep(const ep_scene_reader *r, const raw_compare *given, ep_scene *out);
 

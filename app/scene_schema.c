@@ -208,6 +208,46 @@ static const cyaml_schema_field_t load_fields[] = {
 static const cyaml_schema_value_t load = {
     CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, raw_load, load_fields)};
 
+static const cyaml_schema_field_t turn_fields[] = {
+    VECTOR(raw_turn, axis),
+    CYAML_FIELD_FLOAT("degrees", CYAML_FLAG_DEFAULT, raw_turn, degrees),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_field_t keyframe_fields[] = {
+    CYAML_FIELD_FLOAT("time", CYAML_FLAG_DEFAULT, raw_keyframe, time),
+    CYAML_FIELD_SEQUENCE("move", OPTIONAL, raw_keyframe, move, &number, 3, 3),
+    PART(raw_keyframe, turn, turn_fields),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_value_t keyframe = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, raw_keyframe, keyframe_fields)};
+static const cyaml_schema_field_t sphere_fields[] = {
+    VECTOR(raw_sphere, center),
+    CYAML_FIELD_FLOAT("radius", CYAML_FLAG_DEFAULT, raw_sphere, radius),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_field_t solid_box_fields[] = {
+    VECTOR(raw_solid_box, low),
+    VECTOR(raw_solid_box, high),
+    PART(raw_solid_box, rotation, turn_fields),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_field_t obstacle_fields[] = {
+    PART(raw_obstacle, plane, plane_fields),
+    PART(raw_obstacle, sphere, sphere_fields),
+    PART(raw_obstacle, box, solid_box_fields),
+    NUMBER(raw_obstacle, friction),
+    CYAML_FIELD_SEQUENCE("motion", OPTIONAL, raw_obstacle, motion, &keyframe, 1, 100000),
+    CYAML_FIELD_BOOL_PTR("smooth", OPTIONAL, raw_obstacle, smooth),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_value_t obstacle = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, raw_obstacle, obstacle_fields)};
+static const cyaml_schema_field_t contact_fields[] = {
+    TEXT(raw_contact, stiffness), NUMBER(raw_contact, thickness), NUMBER(raw_contact, depth),
+    NUMBER(raw_contact, damping), NUMBER(raw_contact, friction),  CYAML_FIELD_END,
+};
+
 static const cyaml_schema_value_t format = {
     CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, format_names, CYAML_ARRAY_LEN(format_names))};
 static const cyaml_schema_field_t output_fields[] = {
@@ -249,6 +289,8 @@ static const cyaml_schema_field_t scene_fields[] = {
     PART(raw_scene, simulation, simulation_fields),
     PART(raw_scene, examples, examples_fields),
     CYAML_FIELD_SEQUENCE("loads", OPTIONAL, raw_scene, loads, &load, 0, 256),
+    CYAML_FIELD_SEQUENCE("obstacles", OPTIONAL, raw_scene, obstacles, &obstacle, 0, 10000),
+    PART(raw_scene, contact, contact_fields),
     PART(raw_scene, output, output_fields),
     PART(raw_scene, compare, compare_fields),
     CYAML_FIELD_END,

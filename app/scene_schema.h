@@ -89,6 +89,35 @@ typedef struct raw_load {
   unsigned gravity_count;
   raw_push *push;
 } raw_load;
+typedef struct raw_turn {
+  double axis[3], degrees;
+} raw_turn;
+typedef struct raw_keyframe {
+  double time;
+  double *move; // 3
+  unsigned move_count;
+  raw_turn *turn;
+} raw_keyframe;
+typedef struct raw_sphere {
+  double center[3], radius;
+} raw_sphere;
+typedef struct raw_solid_box {
+  double low[3], high[3];
+  raw_turn *rotation;
+} raw_solid_box;
+typedef struct raw_obstacle {
+  raw_plane *plane;
+  raw_sphere *sphere;
+  raw_solid_box *box;
+  double *friction;
+  raw_keyframe *motion;
+  unsigned motion_count;
+  bool *smooth;
+} raw_obstacle;
+typedef struct raw_contact {
+  char *stiffness; // "auto" or a number
+  double *thickness, *depth, *damping, *friction;
+} raw_contact;
 typedef struct raw_output {
   double *every;
   int *formats;
@@ -118,6 +147,9 @@ typedef struct raw_scene {
   raw_examples *examples;
   raw_load *loads;
   unsigned loads_count;
+  raw_obstacle *obstacles;
+  unsigned obstacles_count;
+  raw_contact *contact;
   raw_output *output;
   raw_compare *compare;
 } raw_scene;

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "app/obstacles.h"
 #include "app/select.h"
 #include "reduced/bake/nlopt_target.h"
 
@@ -25,6 +26,7 @@ typedef struct simulation {
   timed_solver solver;
   double *load;            // (nloads x r) generalised force at full strength
   double *force;           // (r) of the step at hand
+  ep_obstacle *obstacle;   // (nobstacles) where they are in the step at hand
   double elastic, kinetic; // of the last step
   ep_record *record;
 } simulation;
@@ -111,6 +113,7 @@ static ep_status advance(simulation *s, double t, double dt, int level) {
   ep_step_report report = {0};
   s->def.dt = dt;
   set_force(s, t + dt);
+  ep_obstacles_move(s->scene, t, t + dt, s->obstacle);
   const ep_status status = ep_step(s->state, &s->def, &report);
   s->record->newton_iterations += report.newton_iterations;
   s->elastic = report.elastic_energy;
@@ -208,6 +211,17 @@ static ep_status run_steps(simulation *s, const ep_mesh *mesh, ep_log *log, ep_e
                  s->record->rows, s->record->rows * s->scene->dt, 1 << HALVINGS_MAX);
 }
 
+static ep_status make_obstacles(simulation *s, ep_error *err) {
+  const ep_scene *scene = s->scene;
+  s->obstacle = calloc((size_t)scene->nobstacles + 1, sizeof *s->obstacle);
+  if (!s->obstacle) return ep_fail(err, EP_ERR_MEMORY, "no memory for the obstacles");
+  ep_obstacles_make(scene, s->model->rest_scale, s->obstacle);
+  s->def.obstacle = s->obstacle;
+  s->def.obstacles = scene->nobstacles;
+  s->def.contact = scene->contact;
+  return EP_OK;
+}
+
 static void set_up_step(simulation *s, ep_nlopt_target *nlopt) {
   const ep_scene *scene = s->scene;
   s->def = ep_default_step();
@@ -243,12 +257,16 @@ ep_status ep_simulate(const ep_scene *scene, const ep_shapes *shapes, const ep_m
     status = ep_nlopt_target_create(s.state, scene->algorithm, 0, &nlopt, err);
   if (status == EP_OK) {
     set_up_step(&s, nlopt);
+    status = make_obstacles(&s, err);
+  }
+  if (status == EP_OK) {
     status = run_steps(&s, &shapes->shape[0].mesh, log, err);
   }
   out->target_evaluations = (int)s.solver.evaluations;
   ep_nlopt_target_free(nlopt);
   free(s.load);
   free(s.force);
+  free(s.obstacle);
   free(memory);
   return status;
 }

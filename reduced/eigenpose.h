@@ -15,6 +15,7 @@
 #include "reduced/integrator.h"
 #include "reduced/material.h"
 #include "reduced/model_arrays.h"
+#include "reduced/obstacle.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -158,6 +159,15 @@ const double *ep_state_green_weights(const ep_state *state);
 // ---- step ------------------------------------------------------------------------------------
 typedef enum ep_example_force { EP_EXAMPLE_ENERGY, EP_EXAMPLE_LINEAR } ep_example_force;
 
+// How obstacles resist (reduced/contact_point.h); 0: chosen. The penalty's stiffness is chosen from
+// the object's own, and raised in a step that would otherwise end deeper than `depth`.
+typedef struct ep_contact_def {
+  double stiffness; // pressure per depth [Pa/m]; given: never raised
+  double thickness; // contact begins at this distance [length]; 0: 0.2 % of the diagonal
+  double depth;     // wanted bound of the penetration [length]; 0: 0.5 % of the diagonal
+  double damping;   // of the normal motion [s]: pressure damping x stiffness x speed
+} ep_contact_def;
+
 typedef struct ep_step_def {
   int cookie;               // set by ep_default_step; a def made otherwise is refused
   ep_integrator integrator; // EP_IMPLICIT_EULER
@@ -175,19 +185,36 @@ typedef struct ep_step_def {
   ep_example_force example_force; // energy (target as undeformed shape) or strength K0 (q_t - q)
   ep_target_solver target_solver; // NULL: ep_target_newton
   void *target_user;
-  double target_tolerance; // relative gradient of the interpolation (1e-6)
-  double tolerance;        // relative residual of the step's Newton (1e-6)
-  int max_iterations;      // Newton iterations (50)
+  double target_tolerance;     // relative gradient of the interpolation (1e-6)
+  double tolerance;            // relative residual of the step's Newton (1e-6)
+  int max_iterations;          // Newton iterations (50)
+  const ep_obstacle *obstacle; // (obstacles) with their poses at the step's start and end, borrowed
+  int obstacles;               // 0: none. They act where the model has contact vertices
+  ep_contact_def contact;
 } ep_step_def;
 ep_step_def ep_default_step(void);
 // 1 where ep_step accepts it: made by ep_default_step, every number finite and in range.
 int ep_step_def_valid(const ep_step_def *def);
+
+typedef struct ep_contact_report {
+  int touching;     // pairs of vertex and obstacle nearer than the thickness
+  double deepest;   // penetration below the obstacles' surface at the end of the step [length]
+  double force[3];  // on the object [N], friction and damping included
+  double torque[3]; // about the frame's origin (held object: about the origin) [N m]
+  double pressing;  // sum of the normal forces' sizes [N]
+  double energy;    // stored in the penalty [J]
+  double stiffness; // in use [Pa/m]
+  double raised;    // by this factor over the first choice
+  double injected;  // energy a late raise of the stiffness brought in [J]
+  int passes;       // times the step was solved again for friction
+} ep_contact_report;
 
 typedef struct ep_step_report {
   int newton_iterations, line_search_steps, projections; // projections: Cholesky failed, fell back
   double residual;                                       // relative, at the end
   ep_target_report target;
   double elastic_energy, example_energy, kinetic_energy;
+  ep_contact_report contact;
   double green_energy; // of the Green-strain potential: alpha W_a (negative), or its mixed form
 } ep_step_report;
 

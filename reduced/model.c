@@ -1,6 +1,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "reduced/contact.h"
 #include "reduced/eigenpose.h"
 #include "reduced/state.h"
 #include "reduced/tensorfile.h"
@@ -92,6 +93,8 @@ static ep_status read_sizes(const ep_tensorfile *file, ep_model_sizes *z, char *
     return ep_text_refuse(message, "impossible sizes: k examples need descriptors, 1 <= m <= n, or "
                                    "the coefficients of their strains");
   if (z->rigid > 1) return ep_text_refuse(message, "rigid is neither 0 nor 1");
+  if ((z->contacts > 0) != (z->nodes > 0) || z->contacts > z->n || z->nodes > 2 * z->contacts)
+    return ep_text_refuse(message, "impossible sizes: contacts and nodes of their tree");
   if (z->greens > z->k) return ep_text_refuse(message, "greens is more than the examples, k");
   return EP_OK;
 }
@@ -169,6 +172,7 @@ static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *m
   const int k = model->size.k, s = model->size.s, blocks = model->size.blocks;
   const int greens = model->size.greens, cubic = model->size.cubic;
   const int cubic_float = model->size.cubic_float, rigid = model->size.rigid;
+  const int contacts = model->size.contacts, nodes = model->size.nodes;
   const void *data;
 #define DTYPE_double EP_F64
 #define DTYPE_int32  EP_I32
@@ -190,6 +194,12 @@ static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *m
   FIRST_FAILURE(check_at_least_zero("cubature_w", model->cubature_w, s, message));
   FIRST_FAILURE(check_at_least_zero("cubature_lambda", model->cubature_lambda, s, message));
   FIRST_FAILURE(check_at_least_zero("cubature_mu", model->cubature_mu, s, message));
+  FIRST_FAILURE(check_index("contact_vertex", model->contact_vertex, contacts, n, message));
+  FIRST_FAILURE(check_at_least_zero("contact_area", model->contact_area, contacts, message));
+  FIRST_FAILURE(check_at_least_zero("tree_radius", model->tree_radius, nodes, message));
+  FIRST_FAILURE(check_at_least_zero("contact_scale", model->contact_scale, contacts > 0, message));
+  if (!ep_contact_tree_sound(model))
+    return refuse_array(message, "tree_range", "is not the tree of the contact vertices");
   FIRST_FAILURE(check_at_least_zero("green_scale", model->green_scale, greens ? 1 : 0, message));
   if (rigid && !(model->rigid_mass[0] > 0))
     return refuse_array(message, "rigid_mass", "not positive");

@@ -6,12 +6,14 @@
 //   included for constrained objects; 0 where no descriptors are used), k examples, s cubature
 //   elements, blocks = ceil(r / 8): groups of 8 modes, greens independent strains of the examples
 //   (Green-strain path; 0: not used), cubic and cubic_float reals of the cubic path's streams (0:
-//   not used; then without interpolation s may be 0), rigid 1 where nothing is held (free motion).
+//   not used; then without interpolation s may be 0), rigid 1 where nothing is held (free motion),
+//   contacts surface vertices that can move and nodes of the tree over them (0: no obstacles).
 #ifndef EP_REDUCED_MODEL_ARRAYS_H
 #define EP_REDUCED_MODEL_ARRAYS_H
 
 #define EP_MODEL_SIZES(X)                                                                          \
-  X(n) X(nt) X(r) X(m) X(k) X(s) X(blocks) X(greens) X(cubic) X(cubic_float) X(rigid)
+  X(n) X(nt) X(r) X(m) X(k) X(s) X(blocks) X(greens) X(cubic) X(cubic_float) X(rigid)          \
+  X(contacts) X(nodes)
 
 // clang-format off
 #define EP_MODEL_ARRAYS(X)                                                                        \
@@ -60,7 +62,21 @@
   X(double, rigid_s0,      rigid, 6, 1)                                                           \
   X(double, rigid_s1,      rigid, 6, r)                                                           \
   X(double, rigid_s2,      rigid, 6, r * (r + 1) / 2)                                             \
-  X(double, rigid_h,       rigid, 3, r * (r + 1) / 2)
+  X(double, rigid_h,       rigid, 3, r * (r + 1) / 2)                  \
+  /* contact (reduced/contact.h), vertices in the tree's order: number in the mesh, position at */ \
+  /* rest, area, rows of U; per node: first vertex, end, next node when passed over; ball at */   \
+  /* rest, its centre's rows of U, growth of its radius by each |q_k|; Young's modulus over the */ \
+  /* diagonal [Pa/m] */                                                                           \
+  X(int32,  contact_vertex, contacts, 1, 1)                                                       \
+  X(double, contact_x,     contacts, 3, 1)                                                        \
+  X(double, contact_area,  contacts, 1, 1)                                                        \
+  X(double, contact_u,     contacts, 3, r)                                                        \
+  X(int32,  tree_range,    nodes, 3, 1)                                                           \
+  X(double, tree_center,   nodes, 3, 1)                                                           \
+  X(double, tree_u,        nodes, 3, r)                                                           \
+  X(double, tree_radius,   nodes, 1, 1)                                                           \
+  X(double, tree_growth,   nodes, r, 1)                                                           \
+  X(double, contact_scale, contacts ? 1 : 0, 1, 1)
 // clang-format on
 
 #endif

@@ -17,7 +17,7 @@ static ep_precision precision_of(const ep_model *model) {
 static size_t lay_out(const ep_model *model, char *memory, ep_state *state) {
   const size_t r = (size_t)model->size.r, m = (size_t)model->size.m, k = (size_t)model->size.k;
   const size_t s = (size_t)model->size.s, width = 8 * (size_t)model->size.blocks;
-  const size_t greens = (size_t)model->size.greens;
+  const size_t greens = (size_t)model->size.greens, contacts = (size_t)model->size.contacts;
   const size_t examples = k > 0 && m > 0; // without descriptors their scratch is left out
   const size_t cubic_words =
       model->evaluator == EP_EVALUATE_CUBATURE
@@ -70,6 +70,7 @@ ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_st
   state->green_kernel = ep_green_select();
   state->w[0] = 1;
   ep_state_rest_frame(state);
+  state->contact.raise = 1;
   state->energy_noise = 1e-13;
   const int narrow = model->evaluator == EP_EVALUATE_CUBIC_FLOAT;
   if (narrow) state->energy_noise = 2e-6, state->force_noise = 1e-5;

@@ -57,8 +57,23 @@
   X(green_jacobian, greens * width)                                                               \
   X(green_low, greens * width)                                                                    \
   X(green_f, greens ? r : 0)   /* W_StVK beside another material */                              \
-  X(green_h, greens ? r * r : 0)
+  X(green_h, greens ? r * r : 0)                                                                  \
+  X(contact_start, contacts ? r : 0) /* contact: q at the step's start, where friction takes */   \
+  X(contact_lag, contacts ? r : 0)   /* normal forces from, after free flight; rows of one */     \
+  X(contact_ahead, contacts ? r : 0) /* vertex; gradient of the last evaluation */                \
+  X(contact_rows, contacts ? 6 * (r + 6) : 0)                                                     \
+  X(contact_g, contacts ? r : 0)
 // clang-format on
+
+// What contact keeps from step to step and within one (reduced/contact.c).
+typedef struct ep_contact {
+  ep_frame start, lag, ahead; // of a free object, beside contact_start, contact_lag, contact_ahead
+  double way;                 // longest way of a point in free flight
+  double raise, trial_raise;  // factor on the chosen stiffness: after the last step, in this one
+  double stored;              // energy of the penalty after the last step
+  int touching;               // vertices after the last step
+  int passes, raises;         // of this step
+} ep_contact;
 
 struct ep_state {
   const ep_model *model;
@@ -73,6 +88,7 @@ struct ep_state {
   double energy_scale;              // sum_j w_j (lambda + 2 mu): energy at unit strain
   double force_scale;  // sum_j w_j (lambda + 2 mu) |G_j|: generalised force at unit strain
   double strain_scale; // max_j |G_j|_F: strain by a unit q
+  ep_contact contact;
   int has_target;      // a target was found before
   double dt_before;    // of the last step; 0: none, or q or v was written since
   ep_frame frame;      // free motion: reduced/frame.h; at the end of the last step

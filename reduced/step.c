@@ -1,12 +1,13 @@
 // A step as the minimum of the incremental potential (DESIGN "Time step"; reduced/integrator.h), in
 // mass-orthonormal coordinates (U^T M U = I):
 //   Phi(x) = inertia |x - ahead|^2 / 2 + rate (x - base)^T D (x - base) / 2 + W(x) + beta W_t(x) -
-//   f . x
+//   f . x + contact(x)
 // with D = alpha I + beta' K0 and the target's energy W_t frozen within the step; relief takes its
 // share off W while an example force acts.
 #include <math.h>
 #include <string.h>
 
+#include "reduced/contact.h"
 #include "reduced/state.h"
 
 enum { COOKIE = 0x45504f31 }; // "EPO1"
@@ -25,7 +26,8 @@ int ep_step_def_valid(const ep_step_def *d) {
          isfinite(d->damping_mass) && d->damping_stiffness >= 0 && isfinite(d->damping_stiffness) &&
          d->strength >= 0 && isfinite(d->strength) && d->relief >= 0 && d->relief <= 1 &&
          d->tolerance > 0 && d->target_tolerance > 0 && d->max_iterations > 0 &&
-         ep_green_valid(&d->green) && ep_integrator_name(d->integrator) != NULL &&
+         ep_contact_def_valid(d) && ep_green_valid(&d->green) &&
+         ep_integrator_name(d->integrator) != NULL &&
          (d->example_force == EP_EXAMPLE_ENERGY || d->example_force == EP_EXAMPLE_LINEAR);
 }
 
@@ -33,6 +35,7 @@ typedef struct step {
   ep_state *state;
   const ep_step_def *def;
   int examples;         // an example force acts
+  int contact;          // there are obstacles
   double rate, inertia; // of the integrator
   double internal;      // last evaluation: |force| inside, energies
   double elastic, pull, strains;
@@ -98,6 +101,7 @@ static double energy(void *user, const double *x, double *g, double *h, int proj
     sum += 0.5 * (inertia * ahead * ahead + drag * moved * moved) - force * x[a];
     if (g) g[a] += inertia * ahead + drag * moved - force;
   }
+  if (s->contact) sum += ep_contact_energy(state, def, NULL, x, g, h, r);
   if (!h) return sum;
   const int linear = s->examples && def->example_force == EP_EXAMPLE_LINEAR;
   const double stiff = viscous + (linear ? def->strength : 0);
@@ -146,6 +150,25 @@ static void predict(step *s) {
                         &s->rate, &s->inertia);
 }
 
+// The acceleration Newmark's formula goes on with is free of contact (reduced/contact.c).
+static void take_contact_off(step *s) {
+  ep_state *state = s->state;
+  const int r = state->model->size.r;
+  memset(state->contact_g, 0, (size_t)r * sizeof *state->contact_g);
+  ep_contact_energy(state, s->def, NULL, state->x, state->contact_g, NULL, r);
+  for (int a = 0; a < r; a++) state->a[a] += state->contact_g[a];
+}
+
+// Minimise; again where friction or the depth ask for it.
+static ep_status minimise(step *s, ep_newton *newton) {
+  for (;;) {
+    const ep_status status = ep_newton_minimise(s->state, newton);
+    if (status != EP_OK || !s->contact) return status;
+    if (!ep_contact_again(s->state, s->def, NULL, s->state->x)) return EP_OK;
+    newton->max_iterations = newton->iterations + s->def->max_iterations;
+  }
+}
+
 // Start at the free flight or at rest, whichever has the lower potential.
 static void choose_start(step *s) {
   ep_state *state = s->state;
@@ -164,6 +187,7 @@ static void finish(step *s) {
     state->v[a] = state->end_v[a] = s->rate * (state->x[a] - state->base[a]);
     state->q[a] = state->end_q[a] = state->x[a];
   }
+  if (s->contact && s->def->integrator == EP_NEWMARK) take_contact_off(s);
   state->dt_before = s->def->dt;
   if (s->examples) ep_commit_target(state);
 }
@@ -175,6 +199,7 @@ ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *repor
   if (!ep_step_def_valid(def)) return EP_ERR_ARGUMENT;
   step s = {.state = state, .def = def, .examples = state->model->size.k > 0 && def->strength > 0};
   s.examples = s.examples && state->model->size.m > 0; // else only their strains are known
+  s.contact = ep_contact_acts(state, def);
   if (s.examples) {
     ep_status status = ep_find_target(state, def, &report->target);
     if (status != EP_OK) return status;
@@ -186,13 +211,18 @@ ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *repor
                       .tolerance = fmax(def->tolerance, state->force_noise),
                       .max_iterations = def->max_iterations};
   predict(&s);
+  if (s.contact) ep_contact_begin(state, def, NULL, NULL, state->q, state->aside);
   choose_start(&s);
-  ep_status status = ep_newton_minimise(state, &newton);
+  ep_status status = minimise(&s, &newton);
   report->newton_iterations = newton.iterations;
   report->line_search_steps = newton.line_search_steps;
   report->projections = newton.projections;
   report->residual = newton.residual_now;
   if (status != EP_OK) return status;
+  if (s.contact) {
+    ep_contact_measure(state, def, NULL, state->x, &report->contact);
+    ep_contact_commit(state, &report->contact);
+  }
   finish(&s);
   report->elastic_energy = s.elastic;
   report->example_energy = s.pull;

@@ -59,6 +59,7 @@ static ep_status allocate(builder *b, ep_model_memory *out, ep_error *err) {
   int greens = z->greens, cubic = z->cubic, cubic_float = z->cubic_float, rigid = z->rigid;
   (void)n, (void)nt, (void)r, (void)m, (void)k, (void)s, (void)blocks, (void)greens, (void)cubic,
       (void)cubic_float, (void)rigid;
+  const int contacts = z->contacts, nodes = z->nodes;
 #define X(type, name, d1, d2, d3)                                                                  \
   if ((size_t)(d1) * (size_t)(d2) * (size_t)(d3) > 0) {                                            \
     size_t bytes = (size_t)(d1) * (size_t)(d2) * (size_t)(d3) * sizeof *b->a.name;                 \
@@ -220,6 +221,33 @@ static ep_status fill_cubic(builder *b, ep_error *err) {
   return EP_OK;
 }
 
+// Young's modulus, by volume, over the diagonal: the unit of the contact's stiffness.
+static double contact_scale(const ep_fem *fem) {
+  double volume = 0, sum = 0;
+  for (int e = 0; e < fem->mesh->nt; e++) {
+    const double lambda = fem->lambda[e], mu = fem->mu[e];
+    volume += fem->volume[e];
+    sum += fem->volume[e] * mu * (3 * lambda + 2 * mu) / (lambda + mu);
+  }
+  return sum / volume / ep_mesh_diagonal(fem->mesh);
+}
+
+static void fill_contact(builder *b) {
+  const ep_contact_tree *t = b->parts->contact;
+  if (!t) return;
+  const size_t n = (size_t)t->contacts, nodes = (size_t)t->nodes, r = (size_t)t->r;
+  for (size_t i = 0; i < n; i++) b->a.contact_vertex[i] = t->vertex[i];
+  for (size_t i = 0; i < 3 * nodes; i++) b->a.tree_range[i] = t->range[i];
+  memcpy(b->a.contact_x, t->x, 3 * n * sizeof(double));
+  memcpy(b->a.contact_area, t->area, n * sizeof(double));
+  memcpy(b->a.contact_u, t->u, 3 * n * r * sizeof(double));
+  memcpy(b->a.tree_center, t->center, 3 * nodes * sizeof(double));
+  memcpy(b->a.tree_u, t->node_u, 3 * nodes * r * sizeof(double));
+  memcpy(b->a.tree_radius, t->radius, nodes * sizeof(double));
+  memcpy(b->a.tree_growth, t->growth, nodes * r * sizeof(double));
+  b->a.contact_scale[0] = contact_scale(b->parts->fem);
+}
+
 static int cubic_size(const ep_model_parts *p, ep_precision precision) {
   return p->cubic && p->precision == precision ? (int)ep_cubic_stream_size(p->basis->r, precision)
                                                : 0;
@@ -236,7 +264,9 @@ static ep_model_sizes sizes_of(const ep_model_parts *p) {
                           .blocks = (p->basis->r + 7) / 8,
                           .greens = p->green ? p->green->count : 0,
                           .cubic = cubic_size(p, EP_DOUBLE),
-                          .cubic_float = cubic_size(p, EP_FLOAT)};
+                          .cubic_float = cubic_size(p, EP_FLOAT),
+                          .contacts = p->contact ? p->contact->contacts : 0,
+                          .nodes = p->contact ? p->contact->nodes : 0};
 }
 
 ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_error *err) {
@@ -249,6 +279,7 @@ ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_e
   if (b.size.m > 0) EP_TRY_GOTO(status, build_descriptors(&b, err), fail);
   EP_TRY_GOTO(status, build_cubature(&b, err), fail);
   fill_green(&b);
+  fill_contact(&b);
   if (parts->cubic) EP_TRY_GOTO(status, fill_cubic(&b, err), fail);
   out->model.size = b.size;
   out->model.material = parts->fem->model;

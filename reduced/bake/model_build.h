@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "lbspace/lbspace.h"
 #include "reduced/bake/basis.h"
+#include "reduced/bake/contact_tree.h"
 #include "reduced/bake/green_coefficients.h"
 #include "reduced/eigenpose.h"
 
@@ -20,6 +21,7 @@ typedef struct ep_model_parts {
   const ep_green_coefficients *green; // of the Green-strain path, NULL: not used
   const double *cubic;                // (ep_cubic_count(r)) exact StVK coefficients, NULL: not used
   ep_precision precision;             // of the cubic stream in the model
+  const ep_contact_tree *contact;     // surface of the basis' mesh and modes, NULL: no obstacles
 } ep_model_parts;
 
 // A model with memory of its own; nothing of the parts is kept.

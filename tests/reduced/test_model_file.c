@@ -47,6 +47,7 @@ static void same_arrays(const ep_model *x, const ep_model *y) {
   const int k = x->size.k, s = x->size.s, blocks = x->size.blocks, greens = x->size.greens;
   const int cubic = x->size.cubic, cubic_float = x->size.cubic_float;
   const int rigid = x->size.rigid;
+  const int contacts = x->size.contacts, nodes = x->size.nodes;
 #define SAME(type, name, d1, d2, d3)                                                               \
   if ((d1) * (d2) * (d3) == 0)                                                                     \
     assert_null(x->name);                                                                          \
