@@ -13,8 +13,7 @@
 static const int stage_version[] = {
     [EP_STAGE_EIGEN] = 1, [EP_STAGE_MAP] = 2,   [EP_STAGE_POSES] = 3,    [EP_STAGE_MODES] = 1,
     [EP_STAGE_PATHS] = 2, [EP_STAGE_BASIS] = 1, [EP_STAGE_CUBATURE] = 1, [EP_STAGE_GREEN] = 1,
-    [EP_STAGE_MODEL] = 4, [EP_STAGE_CUBIC] = 1, [EP_STAGE_TARGET] = 1,
-    [EP_STAGE_CONTACT] = 1,
+    [EP_STAGE_MODEL] = 4, [EP_STAGE_CUBIC] = 1, [EP_STAGE_TARGET] = 1,   [EP_STAGE_CONTACT] = 1,
 };
 
 // Matching raises the number of functions to 20 (DESIGN "Maps"), coupling uses 2 m.
@@ -29,10 +28,12 @@ typedef struct planner {
 
 const char *ep_stage_kind_name(ep_stage_kind kind) {
   static const char *const names[] = {
-      [EP_STAGE_EIGEN] = "eigen",          [EP_STAGE_MAP] = "map",     [EP_STAGE_POSES] = "poses",
-      [EP_STAGE_MODES] = "modes",          [EP_STAGE_PATHS] = "paths", [EP_STAGE_BASIS] = "basis",
-      [EP_STAGE_CUBATURE] = "cubature",    [EP_STAGE_MODEL] = "model", [EP_STAGE_CUBIC] = "cubic",
-      [EP_STAGE_TARGET] = "interpolation", [EP_STAGE_CONTACT] = "contact", [EP_STAGE_GREEN] = "green",
+      [EP_STAGE_EIGEN] = "eigen",       [EP_STAGE_MAP] = "map",
+      [EP_STAGE_POSES] = "poses",       [EP_STAGE_MODES] = "modes",
+      [EP_STAGE_PATHS] = "paths",       [EP_STAGE_BASIS] = "basis",
+      [EP_STAGE_CUBATURE] = "cubature", [EP_STAGE_MODEL] = "model",
+      [EP_STAGE_CUBIC] = "cubic",       [EP_STAGE_TARGET] = "interpolation",
+      [EP_STAGE_CONTACT] = "contact",   [EP_STAGE_GREEN] = "green",
   };
   return names[kind];
 }

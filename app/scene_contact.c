@@ -44,8 +44,7 @@ ep_status ep_read_motion(const ep_scene_reader *r, const char *key, unsigned cou
 
 // Rotation whose third column is the unit normal; the others do not matter.
 static void face(const double normal[3], double R[9]) {
-  const double length =
-      sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+  const double length = sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
   const double n[3] = {normal[0] / length, normal[1] / length, normal[2] / length};
   int small = 0;
   for (int i = 1; i < 3; i++)

@@ -12,8 +12,9 @@
 #define EP_REDUCED_MODEL_ARRAYS_H
 
 #define EP_MODEL_SIZES(X)                                                                          \
-  X(n) X(nt) X(r) X(m) X(k) X(s) X(blocks) X(greens) X(cubic) X(cubic_float) X(rigid)          \
-  X(contacts) X(nodes)
+  X(n)                                                                                             \
+  X(nt) X(r) X(m) X(k) X(s) X(blocks) X(greens) X(cubic) X(cubic_float) X(rigid) X(contacts)       \
+      X(nodes)
 
 // clang-format off
 #define EP_MODEL_ARRAYS(X)                                                                        \
