@@ -82,7 +82,8 @@ const char *ep_state_isa(const ep_state *state); // kernels in use: "baseline", 
 double *ep_state_q(ep_state *state);             // (r) reduced coordinates, may be written
 double *ep_state_velocity(ep_state *state);      // (r) may be written
 const double *ep_state_weights(const ep_state *state); // (k) example weights of the last step
-const double *ep_state_target(const ep_state *state);  // (r) target configuration of the last step
+// (regions x r) target configurations of the last step, regions = ep_model_regions.
+const double *ep_state_target(const ep_state *state);
 
 // ---- free motion (reduced/frame.h) -----------------------------------------------------------
 // A model is free where nothing holds it (size.rigid): its states then move as a whole too. For a
@@ -113,11 +114,18 @@ double ep_elastic_energy(ep_state *state, const double *q, double *f, double *k,
 double ep_example_energy(ep_state *state, const double *w, const double *q, double *f, double *h,
                          int project);
 
-// c = c0 + T q (Zhao et al. 2018, sec. 4.2): q (r), c (3m).
+// Sets of examples: size.regions, 1 where all examples act everywhere. Each has weights and a
+// target of its own (Zhao et al. 2018, sec. 5 "Local examples"; reduced/region.h). What is counted
+// over shapes is in the order: rest of each set, then the examples.
+int ep_model_regions(const ep_model *model);
+
+// c = c0 + T q (Zhao et al. 2018, sec. 4.2): q (r), c (3m). Of a region nothing holds, the motion
+// as a whole is taken out before: c is then that of R^T (x - xc) + Xc, not linear in q.
 void ep_descriptor(const ep_model *model, const double *q, double *c);
 
 // Weights: min 1/2 |sum_i w_i e_i - c|^2, sum w = 1, w >= 0 over the rest shape and the examples
-// (Zhao et al. 2018 eq. 5). c (3m); w (k + 1), w[0] belongs to the rest shape. Exact active set.
+// (Zhao et al. 2018 eq. 5), of each region by itself. c (3m); w (regions + k), the first belong to
+// the rest shape. Exact active set.
 ep_status ep_example_weights(ep_state *state, const double *c, double *w);
 
 // ---- target ----------------------------------------------------------------------------------
@@ -129,7 +137,9 @@ typedef struct ep_target_report {
 } ep_target_report;
 typedef ep_status (*ep_target_solver)(void *user, ep_state *state, const double *w, double *q,
                                       double tolerance, ep_target_report *report);
-// w (k + 1) as from ep_example_weights: rest counts as one more example with F_i = I.
+// w (regions + k) as from ep_example_weights: rest counts as one more example with F_i = I. With
+// regions: the sum over those with weight of their own energies, over their elements only, and of
+// 1/100 of the energy of what lies outside, which settles how the region's target goes on there.
 double ep_target_energy(ep_state *state, const double *w, const double *q, double *f, double *h,
                         int project);
 // |L^-1 g|, K0 = L L^T, over sqrt(sum_i w_i |L^T (q_w - q_i)|^2), q_w = sum w_i q_i: what the
@@ -169,17 +179,19 @@ typedef struct ep_contact_def {
 } ep_contact_def;
 
 typedef struct ep_step_def {
-  int cookie;               // set by ep_default_step; a def made otherwise is refused
-  ep_integrator integrator; // EP_IMPLICIT_EULER
-  double dt;                // [s]
-  const double *force;      // (r) generalised external force U^T f, or NULL
-  double damping_mass;      // Rayleigh alpha [1/s]
-  double damping_stiffness; // Rayleigh beta [s], against K0
-  double strength;          // example strength; 1: as stiff as the material itself; 0: none
-  double relief;            // share of the material's own energy left out while an example
-                            // force acts, 0 (default) to 1: the object then yields along the
-                            // examples (stiffness 1 - relief) and keeps 1 - relief + strength
-                            // across them (Zhang et al. 2015 eq. 3 has relief = strength)
+  int cookie;                    // set by ep_default_step; a def made otherwise is refused
+  ep_integrator integrator;      // EP_IMPLICIT_EULER
+  double dt;                     // [s]
+  const double *force;           // (r) generalised external force U^T f, or NULL
+  double damping_mass;           // Rayleigh alpha [1/s]
+  double damping_stiffness;      // Rayleigh beta [s], against K0
+  double strength;               // example strength; 1: as stiff as the material itself; 0: none
+  const double *region_strength; // (regions) factor of strength in each, >= 0; NULL: 1
+  double relief;                 // share of the material's own energy left out while an example
+                                 // force acts, 0 (default) to 1: the object then yields along the
+                                 // examples (stiffness 1 - relief) and keeps 1 - relief + strength
+                                 // across them (Zhang et al. 2015 eq. 3 has relief = strength);
+                                 // with regions: there only, and only by cubature
   ep_green green; // Green-strain potential (alpha 0: none). StVK: W + alpha W_a; another material:
                   // (1 - alpha) W + alpha (W_StVK with volume penalty + W_a)
   ep_example_force example_force; // energy (target as undeformed shape) or strength K0 (q_t - q)

@@ -108,12 +108,50 @@ double ep_example_energy(ep_state *state, const double *w, const double *q, doub
   return ep_evaluate(state, add_examples(state, w, 0), q, f, h, project);
 }
 
+// How much the energy outside counts in the target of a region: enough to make the target unique
+// (nothing else tells how it goes on there), too little to pull at the region.
+static const double outside_share = 0.01;
+
+// Rest shapes of the regions with weight, and what lies outside of them. Returns the terms.
+static int add_rest_of_regions(ep_state *state, const double *w) {
+  const ep_model *m = state->model;
+  const int regions = m->size.regions;
+  int terms = 0;
+  for (int g = 0; g < regions; g++) {
+    int used = w[g] != 0;
+    for (int i = 0; i < m->size.k && !used; i++)
+      used = m->example_region[i] == g && w[regions + i] != 0;
+    if (!used) continue;
+    const size_t at = (size_t)g * (size_t)m->size.s;
+    if (w[g] != 0)
+      state->term[terms++] = (ep_kernel_term){.scale = w[g], .weight = m->region_inside + at};
+    state->term[terms++] =
+        (ep_kernel_term){.scale = outside_share, .weight = m->region_outside + at};
+  }
+  return terms;
+}
+
 double ep_target_energy(ep_state *state, const double *w, const double *q, double *f, double *h,
                         int project) {
+  const ep_model *m = state->model;
   int terms = 0;
-  if (w[0] != 0)
-    state->term[terms++] = (ep_kernel_term){.scale = w[0], .weight = state->model->cubature_w};
-  return ep_evaluate(state, add_examples(state, w + 1, terms), q, f, h, project);
+  if (m->size.regions)
+    terms = add_rest_of_regions(state, w);
+  else if (w[0] != 0)
+    state->term[terms++] = (ep_kernel_term){.scale = w[0], .weight = m->cubature_w};
+  return ep_evaluate(state, add_examples(state, w + ep_model_regions(m), terms), q, f, h, project);
+}
+
+int ep_force_terms(ep_state *state, const ep_step_def *def, int terms) {
+  const size_t s = (size_t)state->model->size.s;
+  for (int g = 0; g < ep_model_regions(state->model); g++) {
+    const double factor = def->region_strength ? def->region_strength[g] : 1;
+    if (factor == 0) continue;
+    state->term[terms++] = (ep_kernel_term){.scale = def->strength * factor,
+                                            .inverse = state->target_inverse + (size_t)g * s * 9,
+                                            .weight = state->target_weight + (size_t)g * s};
+  }
+  return terms;
 }
 
 // F of one element, in the layout's own lanes (padded_q holds q and zeros).
@@ -130,13 +168,26 @@ static void element_gradient(const ep_state *state, int e, double f[9]) {
   }
 }
 
-void ep_freeze_target(ep_state *state) {
+static void freeze(ep_state *state, int set, const double *weight) {
   const ep_model *m = state->model;
-  memcpy(state->padded_q, state->next_target, (size_t)m->size.r * sizeof(double));
+  const size_t s = (size_t)m->size.s, r = (size_t)m->size.r;
+  double *inverse = state->target_inverse + (size_t)set * s * 9;
+  memcpy(state->padded_q, state->next_target + (size_t)set * r, r * sizeof(double));
   for (int e = 0; e < m->size.s; e++) {
     double f[9];
+    if (weight[e] == 0) { // outside of the region: target_weight stays zero
+      for (int c = 0; c < 9; c++) inverse[9 * e + c] = c % 4 == 0;
+      continue;
+    }
     element_gradient(state, e, f);
-    state->target_weight[e] =
-        m->cubature_w[e] * ep_reference_element(f, state->target_inverse + 9 * e);
+    state->target_weight[(size_t)set * s + (size_t)e] =
+        weight[e] * ep_reference_element(f, inverse + 9 * e);
   }
+}
+
+void ep_freeze_target(ep_state *state) {
+  const ep_model *m = state->model;
+  for (int g = 0; g < m->size.regions; g++)
+    freeze(state, g, m->region_inside + (size_t)g * (size_t)m->size.s);
+  if (!m->size.regions) freeze(state, 0, m->cubature_w);
 }

@@ -77,8 +77,9 @@ static void pull_tangent(lane w, const lane h[81], const lane b[9], lane sum[81]
 // Add one term at F of 8 elements to stress (9) and tangent (81, or NULL); returns its energies.
 static void add_term(const ep_kernel_task *t, const ep_kernel_term *term, int first,
                      const lane f[9], lane *energy, lane stress[9], lane *tangent) {
-  const lane lambda = gather(t->lambda, 1, first, t->s, 0), mu = gather(t->mu, 1, first, t->s, 0);
   const lane weight = gather(term->weight, 1, first, t->s, 0);
+  if (!lane_any(weight != lane_all(0))) return; // outside the region of a local example
+  const lane lambda = gather(t->lambda, 1, first, t->s, 0), mu = gather(t->mu, 1, first, t->s, 0);
   const lane w = weight * lane_all(term->scale);
   const int want_stress = t->f || t->k;
   lane b[9], x[9], p[9], h[81];

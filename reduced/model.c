@@ -95,6 +95,8 @@ static ep_status read_sizes(const ep_tensorfile *file, ep_model_sizes *z, char *
   if (z->rigid > 1) return ep_text_refuse(message, "rigid is neither 0 nor 1");
   if ((z->contacts > 0) != (z->nodes > 0) || z->contacts > z->n || z->nodes > 2 * z->contacts)
     return ep_text_refuse(message, "impossible sizes: contacts and nodes of their tree");
+  if (z->regions > z->k || (z->regions > 0 && z->m < z->regions))
+    return ep_text_refuse(message, "regions must have examples and functions of their own");
   if (z->greens > z->k) return ep_text_refuse(message, "greens is more than the examples, k");
   return EP_OK;
 }
@@ -167,12 +169,34 @@ static ep_status check_index(const char *name, const int32_t *x, int64_t count, 
     if (status_ != EP_OK) return status_;                                                          \
   } while (0)
 
+// Every region has functions and examples.
+static ep_status check_regions(const ep_model *model, char *message) {
+  const int regions = model->size.regions, k = model->size.k, s = model->size.s;
+  if (!regions) return EP_OK;
+  const int32_t *first = model->region_first;
+  FIRST_FAILURE(check_index("example_region", model->example_region, k, regions, message));
+  FIRST_FAILURE(check_at_least_zero("region_inside", model->region_inside, regions * s, message));
+  FIRST_FAILURE(check_at_least_zero("region_outside", model->region_outside, regions * s, message));
+  for (int g = 0; g < regions; g++) {
+    int examples = 0;
+    for (int i = 0; i < k; i++) examples += model->example_region[i] == g;
+    if (!examples)
+      return refuse_array(message, "example_region", "leaves a region without examples");
+    if (first[g] >= first[g + 1] || first[0] != 0 || first[g + 1] > model->size.m)
+      return refuse_array(message, "region_first", "does not divide the functions");
+  }
+  return first[regions] == model->size.m
+             ? EP_OK
+             : refuse_array(message, "region_first", "does not divide the functions");
+}
+
 static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *message) {
   const int n = model->size.n, nt = model->size.nt, r = model->size.r, m = model->size.m;
   const int k = model->size.k, s = model->size.s, blocks = model->size.blocks;
   const int greens = model->size.greens, cubic = model->size.cubic;
   const int cubic_float = model->size.cubic_float, rigid = model->size.rigid;
   const int contacts = model->size.contacts, nodes = model->size.nodes;
+  const int regions = model->size.regions;
   const void *data;
 #define DTYPE_double EP_F64
 #define DTYPE_int32  EP_I32
@@ -203,6 +227,7 @@ static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *m
   FIRST_FAILURE(check_at_least_zero("green_scale", model->green_scale, greens ? 1 : 0, message));
   if (rigid && !(model->rigid_mass[0] > 0))
     return refuse_array(message, "rigid_mass", "not positive");
+  FIRST_FAILURE(check_regions(model, message));
   return check_at_least_zero("example_w", model->example_w, m ? k * s : 0, message);
 }
 
@@ -268,14 +293,5 @@ void ep_positions(const ep_model *model, const double *q, double *x) {
   for (int a = 0; a < model->size.r; a++) {
     const double *u = model->u + (size_t)a * width;
     for (size_t i = 0; i < width; i++) x[i] += q[a] * u[i];
-  }
-}
-
-void ep_descriptor(const ep_model *model, const double *q, double *c) {
-  const int rows = 3 * model->size.m, r = model->size.r;
-  for (int i = 0; i < rows; i++) {
-    double sum = model->c0[i];
-    for (int a = 0; a < r; a++) sum += model->t[(size_t)i * (size_t)r + (size_t)a] * q[a];
-    c[i] = sum;
   }
 }

@@ -3,7 +3,8 @@
 // Dimensions are members of ep_model_sizes (or literals). Arrays whose product is 0 are absent.
 //
 //   sizes: n vertices, nt tets, r modes, m LB functions of the descriptor (the constant one
-//   included for constrained objects; 0 where no descriptors are used), k examples, s cubature
+//   included for constrained objects; 0 where no descriptors are used; with regions the sum of
+//   theirs), k examples, regions sets of examples (0: one set, acting everywhere), s cubature
 //   elements, blocks = ceil(r / 8): groups of 8 modes, greens independent strains of the examples
 //   (Green-strain path; 0: not used), cubic and cubic_float reals of the cubic path's streams (0:
 //   not used; then without interpolation s may be 0), rigid 1 where nothing is held (free motion),
@@ -13,7 +14,7 @@
 
 #define EP_MODEL_SIZES(X)                                                                          \
   X(n)                                                                                             \
-  X(nt) X(r) X(m) X(k) X(s) X(blocks) X(greens) X(cubic) X(cubic_float) X(rigid) X(contacts)       \
+  X(nt) X(r) X(m) X(k) X(regions) X(s) X(blocks) X(greens) X(cubic) X(cubic_float) X(rigid) X(contacts)       \
       X(nodes)
 
 // clang-format off
@@ -41,6 +42,18 @@
   /* per example, per cubature element: inverse of F_i (row-major 9) and w |det F_i| */           \
   X(double, example_finv,  m ? k : 0, s, 9)                                                       \
   X(double, example_w,     m ? k : 0, s, 1)                                                       \
+  /* regions (reduced/region.h): set of each example; first function of each region's descriptor; */\
+  /* weights of the elements inside and outside (their sum is cubature_w; of examples, example_w */\
+  /* is theirs inside); whether the region is carried along, not held: then its motion is taken  */\
+  /* out of the descriptor, by rows A (9) and centre (3) of q and at rest, and sums of functions */\
+  X(int32,  example_region, regions ? k : 0, 1, 1)                                                \
+  X(int32,  region_first,  regions ? regions + 1 : 0, 1, 1)                                       \
+  X(double, region_inside, regions, s, 1)                                                         \
+  X(double, region_outside, regions, s, 1)                                                        \
+  X(int32,  region_carried, regions, 1, 1)                                                        \
+  X(double, region_motion, regions, 12, r)                                                        \
+  X(double, region_motion_rest, regions, 12, 1)                                                   \
+  X(double, region_mean,   regions ? m : 0, 1, 1)                                                 \
   /* Green-strain path: y_i = linear_i . q + 1/2 q^T B_i q of orthonormal combinations of the */  \
   /* examples' strains, B_i in 8 x 8 tiles (reduced/green.h); weights w = V y, V (k x greens); */ \
   /* strain energy of each example; their mean, the unit of the weights' penalties */             \

@@ -18,6 +18,7 @@ static size_t lay_out(const ep_model *model, char *memory, ep_state *state) {
   const size_t r = (size_t)model->size.r, m = (size_t)model->size.m, k = (size_t)model->size.k;
   const size_t s = (size_t)model->size.s, width = 8 * (size_t)model->size.blocks;
   const size_t greens = (size_t)model->size.greens, contacts = (size_t)model->size.contacts;
+  const size_t regions = (size_t)model->size.regions, sets = (size_t)ep_model_regions(model);
   const size_t examples = k > 0 && m > 0; // without descriptors their scratch is left out
   const size_t cubic_words =
       model->evaluator == EP_EVALUATE_CUBATURE
@@ -25,7 +26,7 @@ static size_t lay_out(const ep_model *model, char *memory, ep_state *state) {
           : ep_cubic_scratch(model->size.r, precision_of(model)) / sizeof(double);
   size_t used = rounded(sizeof *state);
   if (memory) state->term = (ep_kernel_term *)(memory + used);
-  used += rounded((k + 2) * sizeof *state->term);
+  used += rounded((k + 2 * sets) * sizeof *state->term);
 #define X(name, count)                                                                             \
   if (memory) state->name = (double *)(memory + used);                                             \
   used += rounded((size_t)(count) * sizeof(double));
@@ -68,7 +69,7 @@ ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_st
   state->model = model;
   state->kernel = ep_kernel_select(&state->isa);
   state->green_kernel = ep_green_select();
-  state->w[0] = 1;
+  for (int g = 0; g < ep_model_regions(model); g++) state->w[g] = 1;
   ep_state_rest_frame(state);
   state->contact.raise = 1;
   state->energy_noise = 1e-13;
@@ -100,7 +101,7 @@ double *ep_state_velocity(ep_state *state) {
   return state->v;
 }
 const double *ep_state_weights(const ep_state *state) {
-  return state->w + 1;
+  return state->w + ep_model_regions(state->model);
 }
 const double *ep_state_target(const ep_state *state) {
   return state->target;

@@ -6,22 +6,23 @@
 #include "reduced/eigenpose.h"
 #include "reduced/green.h"
 #include "reduced/kernel.h"
+#include "reduced/region.h"
 
-// Arrays of a state: X(name, number of doubles). width = 8 ceil(r / 8).
+// Arrays of a state: X(name, number of doubles). width = 8 ceil(r / 8), sets = ep_model_regions.
 // clang-format off
 #define EP_STATE_ARRAYS(X)                                                                        \
   X(q, r)                  /* configuration and velocity */                                        \
   X(v, r)                                                                                         \
-  X(w, k + 1)              /* weights of rest and examples, target of the last interpolation */   \
-  X(target, r)                                                                                    \
+  X(w, sets + k)           /* weights of rest and examples, target of the last interpolation */   \
+  X(target, sets * r)                                                                                    \
   X(shift, 3 * m)          /* what nonlinear interpolation adds to the blend: target.c */          \
   X(k0_factor, r * r)      /* lower Cholesky factor of K0 */                                      \
-  X(target_inverse, examples * s * 9)  /* the target as undeformed shape: F_t^-1, w |det F_t| */   \
-  X(target_weight, examples * s)                                                                  \
+  X(target_inverse, examples * sets * s * 9)  /* the target as undeformed shape: F_t^-1, w |det F_t| */   \
+  X(target_weight, examples * sets * s)                                                                  \
   X(c, 3 * m)              /* descriptor */                                                       \
   X(gram, examples * (k + 1) * (k + 1))   /* weights: Gram matrix, factor, small vectors */       \
   X(corral, examples * (k + 1) * (k + 1))                                                         \
-  X(small, examples * 3 * (k + 1))                                                                \
+  X(small, examples * 5 * (k + 1))                                                                \
   X(padded_q, width)       /* what the kernels read and write */                                  \
   X(padded_f, width)                                                                              \
   X(padded_k, width * width)                                                                      \
@@ -40,9 +41,11 @@
   X(v_before, r)                                                                                  \
   X(end_q, r)                                                                                     \
   X(end_v, r)                                                                                     \
-  X(next_w, k + 1)         /* interpolation under way: kept only when the step succeeds */        \
-  X(next_target, r)                                                                               \
+  X(next_w, sets + k)         /* interpolation under way: kept only when the step succeeds */        \
+  X(next_target, sets * r)                                                                               \
   X(work, r)                                                                                      \
+  X(set_w, regions ? sets + k : 0)     /* regions: weights of one set; the material's elements */  \
+  X(kept_weight, regions ? s : 0)      /* less what relief leaves out */                          \
   X(cubic_scratch, cubic_words)  /* cubic path: scratch, and what it gave last */                  \
   X(cubic_at, cubic_words ? r : 0)                                                                \
   X(cubic_f, cubic_words ? r : 0)                                                                 \
@@ -84,7 +87,7 @@ struct ep_state {
   double cubic_energy; // at cubic_at, where cubic_known
   int cubic_known;
   double energy_noise, force_noise; // relative round-off of energies and residuals
-  ep_kernel_term *term;             // (k + 2) terms of one evaluation
+  ep_kernel_term *term;             // (k + 2 sets) terms of one evaluation
   double energy_scale;              // sum_j w_j (lambda + 2 mu): energy at unit strain
   double force_scale;  // sum_j w_j (lambda + 2 mu) |G_j|: generalised force at unit strain
   double strain_scale; // max_j |G_j|_F: strain by a unit q
@@ -130,6 +133,10 @@ double ep_green_share(const ep_model *model, const ep_green *green);
 // strength W_a at q; its gradient and Hessian are added to f and h unless NULL (reduced/green.c).
 double ep_green_add(ep_state *state, const ep_green *green, double strength, const double *q,
                     double *f, double *h);
+
+// Terms of the example force with the targets as they are frozen, from `term` on: one for each
+// region with strength. Returns how many terms there are then.
+int ep_force_terms(ep_state *state, const ep_step_def *def, int terms);
 
 // Weights and target of the state's q into next_w and next_target, and the target as undeformed
 // shape of an energy into target_inverse and target_weight (without elements it crushes).

@@ -34,10 +34,11 @@ int ep_step_def_valid(const ep_step_def *d) {
 typedef struct step {
   ep_state *state;
   const ep_step_def *def;
-  int examples;         // an example force acts
-  int contact;          // there are obstacles
-  double rate, inertia; // of the integrator
-  double internal;      // last evaluation: |force| inside, energies
+  int examples;              // an example force acts
+  const double *kept_weight; // (s) of the material where relief takes a part of it; NULL: all alike
+  int contact;               // there are obstacles
+  double rate, inertia;      // of the integrator
+  double internal;           // last evaluation: |force| inside, energies
   double elastic, pull, strains;
   double cancelling; // energy of terms that cancel: round-off counts from there
 } step;
@@ -64,17 +65,19 @@ static double inner_energy(step *s, const double *x, double *g, double *h, int p
   const int as_energy = s->examples && def->example_force == EP_EXAMPLE_ENERGY;
   const int by_cubature = state->model->evaluator == EP_EVALUATE_CUBATURE;
   const double kept = s->examples ? 1 - def->relief : 1;
-  const double share = kept * ep_green_share(state->model, &def->green);
+  const double share = (s->kept_weight ? 1 : kept) * ep_green_share(state->model, &def->green);
   ep_green green = def->green; // shares what relief leaves, or the sum would have no lower bound
   green.alpha *= kept;
   int terms = 0;
-  if (by_cubature)
-    state->term[terms++] = (ep_kernel_term){.scale = share, .weight = state->model->cubature_w};
-  if (as_energy)
-    state->term[terms++] = (ep_kernel_term){
-        .scale = def->strength, .inverse = state->target_inverse, .weight = state->target_weight};
+  if (by_cubature) {
+    const double *weight = s->kept_weight ? s->kept_weight : state->model->cubature_w;
+    state->term[terms++] = (ep_kernel_term){.scale = share, .weight = weight};
+  }
+  const int first = terms;
+  if (as_energy) terms = ep_force_terms(state, def, terms);
   ep_evaluate(state, terms, x, g, h, project);
-  s->pull = as_energy ? state->term[terms - 1].energy : 0;
+  s->pull = 0;
+  for (int i = first; i < terms; i++) s->pull += state->term[i].energy;
   s->elastic = by_cubature ? state->term[0].energy : ep_cubic_add(state, share, x, g, h, project);
   if (s->examples && !as_energy)
     s->pull = 0.5 * def->strength * add_k0(s, def->strength, x, state->next_target, g);
@@ -192,11 +195,33 @@ static void finish(step *s) {
   if (s->examples) ep_commit_target(state);
 }
 
+// What the model cannot do with its regions: act on a part of the object by K0 or by polynomials.
+static int suits_regions(const ep_model *m, const ep_step_def *def) {
+  if (!m->size.regions || def->strength == 0) return 1;
+  for (int g = 0; def->region_strength && g < m->size.regions; g++)
+    if (!(def->region_strength[g] >= 0) || !isfinite(def->region_strength[g])) return 0;
+  return def->example_force == EP_EXAMPLE_ENERGY &&
+         (def->relief == 0 || m->evaluator == EP_EVALUATE_CUBATURE);
+}
+
+// Relief of regions: the share of an element that some region with strength takes.
+static const double *relieve_regions(ep_state *state, const ep_step_def *def) {
+  const ep_model *m = state->model;
+  for (int e = 0; e < m->size.s; e++) {
+    double taken = 0;
+    for (int g = 0; g < m->size.regions; g++)
+      if (!def->region_strength || def->region_strength[g] > 0)
+        taken = fmax(taken, m->region_inside[(size_t)g * (size_t)m->size.s + (size_t)e]);
+    state->kept_weight[e] = m->cubature_w[e] - def->relief * taken;
+  }
+  return state->kept_weight;
+}
+
 ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *report) {
   ep_step_report unused;
   if (!report) report = &unused;
   *report = (ep_step_report){0};
-  if (!ep_step_def_valid(def)) return EP_ERR_ARGUMENT;
+  if (!ep_step_def_valid(def) || !suits_regions(state->model, def)) return EP_ERR_ARGUMENT;
   step s = {.state = state, .def = def, .examples = state->model->size.k > 0 && def->strength > 0};
   s.examples = s.examples && state->model->size.m > 0; // else only their strains are known
   s.contact = ep_contact_acts(state, def);
@@ -204,6 +229,8 @@ ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *repor
     ep_status status = ep_find_target(state, def, &report->target);
     if (status != EP_OK) return status;
   }
+  if (s.examples && state->model->size.regions && def->relief > 0)
+    s.kept_weight = relieve_regions(state, def);
   ep_newton newton = {.energy = energy,
                       .residual = residual,
                       .user = &s,
@@ -238,11 +265,8 @@ double ep_example_force_energy(ep_state *state, const ep_step_def *def, const do
   if (f) memset(f, 0, (size_t)r * sizeof *f);
   if (h) memset(h, 0, (size_t)(r * r) * sizeof *h);
   if (state->model->size.k == 0 || state->model->size.m == 0 || def->strength == 0) return 0;
-  if (def->example_force == EP_EXAMPLE_ENERGY) {
-    state->term[0] = (ep_kernel_term){
-        .scale = def->strength, .inverse = state->target_inverse, .weight = state->target_weight};
-    return ep_evaluate(state, 1, q, f, h, project);
-  }
+  if (def->example_force == EP_EXAMPLE_ENERGY)
+    return ep_evaluate(state, ep_force_terms(state, def, 0), q, f, h, project);
   for (int i = 0; h && i < r * r; i++) h[i] = def->strength * state->model->k0[i];
   return 0.5 * def->strength * add_k0(&s, def->strength, q, state->target, f);
 }
@@ -251,7 +275,7 @@ ep_status ep_interpolate(ep_state *state, const ep_step_def *def, ep_target_repo
   ep_target_report unused;
   if (!report) report = &unused;
   *report = (ep_target_report){0};
-  if (!ep_step_def_valid(def)) return EP_ERR_ARGUMENT;
+  if (!ep_step_def_valid(def) || !suits_regions(state->model, def)) return EP_ERR_ARGUMENT;
   if (state->model->size.k == 0 || state->model->size.m == 0) return EP_OK;
   ep_status status = ep_find_target(state, def, report);
   if (status == EP_OK) ep_commit_target(state);

@@ -5,8 +5,19 @@
 
 #include "reduced/state.h"
 
+// Shape i of sets + k: rest of each set (NULL), then the examples.
 static const double *pose(const ep_model *m, int i) {
-  return m->example_q + (size_t)(i - 1) * (size_t)m->size.r;
+  const int sets = ep_model_regions(m);
+  return i < sets ? NULL : m->example_q + (size_t)(i - sets) * (size_t)m->size.r;
+}
+
+// sum of w_i pose_i, the linear blend: out (r).
+static void blend_poses(const ep_model *m, const double *w, double *out) {
+  const int sets = ep_model_regions(m), r = m->size.r;
+  for (int a = 0; a < r; a++) {
+    out[a] = 0;
+    for (int i = sets; i < sets + m->size.k; i++) out[a] += w[i] * pose(m, i)[a];
+  }
 }
 
 // sqrt(sum_i w_i |L^T (q_w - q_i)|^2) over rest (q = 0) and examples; uses state->work.
@@ -15,13 +26,11 @@ static double spread(ep_state *state, const double *w) {
   const int r = m->size.r;
   const double *l = state->k0_factor;
   double total = 0;
-  for (int i = 0; i <= m->size.k; i++) {
+  for (int i = 0; i < ep_model_regions(m) + m->size.k; i++) {
     if (w[i] == 0) continue;
-    for (int a = 0; a < r; a++) {
-      double mean = 0;
-      for (int j = 1; j <= m->size.k; j++) mean += w[j] * pose(m, j)[a];
-      state->work[a] = mean - (i > 0 ? pose(m, i)[a] : 0);
-    }
+    const double *shape = pose(m, i);
+    blend_poses(m, w, state->work);
+    for (int a = 0; shape && a < r; a++) state->work[a] -= shape[a];
     for (int a = 0; a < r; a++) { // row a of L^T
       double sum = 0;
       for (int b = a; b < r; b++) sum += l[r * b + a] * state->work[b];
@@ -83,16 +92,15 @@ ep_status ep_target_newton(void *user, ep_state *state, const double *w, double 
 }
 
 // 1 where all weight is on one shape: then the target is that shape, exactly.
-static int single_shape(const ep_state *state, double *q) {
-  const ep_model *m = state->model;
+static int single_shape(const ep_model *m, const double *w, double *q) {
   const size_t bytes = (size_t)m->size.r * sizeof *q;
   int shape = -1;
-  for (int i = 0; i <= m->size.k; i++) {
-    if (state->next_w[i] == 0) continue;
+  for (int i = 0; i < ep_model_regions(m) + m->size.k; i++) {
+    if (w[i] == 0) continue;
     if (shape >= 0) return 0;
     shape = i;
   }
-  if (shape > 0)
+  if (shape >= 0 && pose(m, shape))
     memcpy(q, pose(m, shape), bytes);
   else
     memset(q, 0, bytes);
@@ -100,17 +108,13 @@ static int single_shape(const ep_state *state, double *q) {
 }
 
 // Start of the minimisation: the last target or the linear blend, whichever has less energy.
-static void choose_start(ep_state *state, double *q) {
+static void choose_start(ep_state *state, const double *w, const double *before, double *q) {
   const ep_model *m = state->model;
-  const int r = m->size.r;
-  for (int a = 0; a < r; a++) {
-    q[a] = 0;
-    for (int i = 1; i <= m->size.k; i++) q[a] += state->next_w[i] * pose(m, i)[a];
-  }
+  blend_poses(m, w, q);
   if (!state->has_target) return;
-  double blend = ep_target_energy(state, state->next_w, q, NULL, NULL, 0);
-  double last = ep_target_energy(state, state->next_w, state->target, NULL, NULL, 0);
-  if (last < blend) memcpy(q, state->target, (size_t)r * sizeof *q);
+  double blend = ep_target_energy(state, w, q, NULL, NULL, 0);
+  double last = ep_target_energy(state, w, before, NULL, NULL, 0);
+  if (last < blend) memcpy(q, before, (size_t)m->size.r * sizeof *q);
 }
 
 // The target should be the shape of the example manifold *nearest* to c (Zhao et al. 2018 eq. 1),
@@ -128,13 +132,17 @@ static void subtract_shift(const ep_state *state, double *c) {
 
 static void update_shift(ep_state *state) {
   const ep_model *m = state->model;
-  const int length = 3 * m->size.m;
-  ep_descriptor(m, state->target, state->c);
-  for (int i = 0; i < length; i++) {
-    double blend = state->w[0] * m->c0[i];
-    for (int e = 0; e < m->size.k; e++)
-      blend += state->w[e + 1] * m->example_c[(size_t)e * (size_t)length + (size_t)i];
-    state->shift[i] += shift_relaxation * (state->c[i] - blend - state->shift[i]);
+  const int length = 3 * m->size.m, sets = ep_model_regions(m);
+  for (int g = 0; g < sets; g++) {
+    const int from = 3 * ep_region_first(m, g);
+    ep_region_descriptor(m, g, state->target + (size_t)g * (size_t)m->size.r, state->c);
+    for (int i = from; i < from + ep_region_length(m, g); i++) {
+      double blend = state->w[g] * m->c0[i];
+      for (int e = 0; e < m->size.k; e++)
+        if (ep_region_of(m, e) == g)
+          blend += state->w[sets + e] * m->example_c[(size_t)e * (size_t)length + (size_t)i];
+      state->shift[i] += shift_relaxation * (state->c[i] - blend - state->shift[i]);
+    }
   }
 }
 
@@ -145,26 +153,53 @@ static void aim_ahead(ep_state *state, double dt) {
   for (int a = 0; a < state->model->size.r; a++) state->x[a] = state->q[a] + dt * state->v[a];
 }
 
+// The weights of one set, those of the others zero.
+static const double *weights_of_set(ep_state *state, int set) {
+  const ep_model *m = state->model;
+  const int regions = m->size.regions;
+  if (!regions) return state->next_w;
+  for (int g = 0; g < regions; g++) state->set_w[g] = g == set ? state->next_w[g] : 0;
+  for (int i = 0; i < m->size.k; i++)
+    state->set_w[regions + i] = ep_region_of(m, i) == set ? state->next_w[regions + i] : 0;
+  return state->set_w;
+}
+
+static ep_status find_target_of_set(ep_state *state, int set, const ep_step_def *def,
+                                    ep_target_report *report) {
+  const size_t at = (size_t)set * (size_t)state->model->size.r;
+  const double *w = weights_of_set(state, set);
+  double *q = state->next_target + at;
+  if (single_shape(state->model, w, q)) return EP_OK;
+  choose_start(state, w, state->target + at, q);
+  ep_target_solver solver = def->target_solver ? def->target_solver : ep_target_newton;
+  ep_target_report one = {0};
+  const ep_status status =
+      solver(def->target_user, state, w, q, def->target_tolerance, report ? &one : NULL);
+  if (!report) return status;
+  report->evaluations += one.evaluations;
+  report->iterations += one.iterations;
+  report->relative_gradient = fmax(report->relative_gradient, one.relative_gradient);
+  return status;
+}
+
 ep_status ep_find_target(ep_state *state, const ep_step_def *def, ep_target_report *report) {
   aim_ahead(state, def->dt);
   ep_descriptor(state->model, state->x, state->c);
   subtract_shift(state, state->c);
   ep_status status = ep_example_weights(state, state->c, state->next_w);
   if (status != EP_OK) return status;
-  if (!single_shape(state, state->next_target)) {
-    choose_start(state, state->next_target);
-    ep_target_solver solver = def->target_solver ? def->target_solver : ep_target_newton;
-    status = solver(def->target_user, state, state->next_w, state->next_target,
-                    def->target_tolerance, report);
-    if (status != EP_OK) return status;
-  }
+  for (int g = 0; g < ep_model_regions(state->model) && status == EP_OK; g++)
+    status = find_target_of_set(state, g, def, report);
+  if (status != EP_OK) return status;
   ep_freeze_target(state);
   return EP_OK;
 }
 
 void ep_commit_target(ep_state *state) {
-  memcpy(state->w, state->next_w, (size_t)(state->model->size.k + 1) * sizeof *state->w);
-  memcpy(state->target, state->next_target, (size_t)state->model->size.r * sizeof *state->target);
+  const size_t sets = (size_t)ep_model_regions(state->model);
+  const size_t k = (size_t)state->model->size.k, r = (size_t)state->model->size.r;
+  memcpy(state->w, state->next_w, (sets + k) * sizeof *state->w);
+  memcpy(state->target, state->next_target, sets * r * sizeof *state->target);
   state->has_target = 1;
   update_shift(state);
 }

@@ -8,7 +8,8 @@
 #include "reduced/state.h"
 
 typedef struct polytope {
-  int count;         // shapes
+  int count;         // shapes: rest and the examples of one region
+  const int *shape;  // (count) 0 or the number of the example, from 1
   double *gram;      // (count x count) p_i . p_j, p_i = e_i - c
   double scale;      // max |p_i|^2
   double *w;         // (count) weights, zero outside the corral
@@ -23,16 +24,16 @@ static const double *descriptor_of(const ep_model *m, int i) {
 }
 
 // 0 where a descriptor is not finite.
-static int fill_gram(const ep_model *m, const double *c, polytope *p) {
-  const int length = 3 * m->size.m;
+static int fill_gram(const ep_model *m, int region, const double *c, polytope *p) {
+  const int length = ep_region_length(m, region), first = 3 * ep_region_first(m, region);
   double trace = 0;
   p->scale = 0;
   for (int i = 0; i < p->count; i++) {
-    const double *a = descriptor_of(m, i);
+    const double *a = descriptor_of(m, p->shape[i]) + first;
     for (int j = 0; j <= i; j++) {
-      const double *b = descriptor_of(m, j);
+      const double *b = descriptor_of(m, p->shape[j]) + first;
       double sum = 0;
-      for (int d = 0; d < length; d++) sum += (a[d] - c[d]) * (b[d] - c[d]);
+      for (int d = 0; d < length; d++) sum += (a[d] - c[first + d]) * (b[d] - c[first + d]);
       p->gram[i * p->count + j] = p->gram[j * p->count + i] = sum;
     }
     p->scale = fmax(p->scale, p->gram[i * p->count + i]);
@@ -117,20 +118,38 @@ static ep_status nearest_point(polytope *p) {
   return EP_ERR_NUMERIC;
 }
 
-ep_status ep_example_weights(ep_state *state, const double *c, double *w) {
+// Weights of one region, by the numbers of its shapes into w (regions + k).
+static ep_status region_weights(ep_state *state, int region, const double *c, double *w) {
   const ep_model *m = state->model;
-  const int count = m->size.k + 1;
-  if (count == 1) {
+  const int most = m->size.k + 1, regions = ep_model_regions(m);
+  int *shape = (int *)(void *)(state->small + 3 * most), count = 0;
+  shape[count++] = 0;
+  for (int i = 0; i < m->size.k; i++)
+    if (ep_region_of(m, i) == region) shape[count++] = i + 1;
+  polytope p = {.count = count,
+                .shape = shape,
+                .gram = state->gram,
+                .w = state->small + 4 * most,
+                .corral = (int *)(void *)(state->small + 2 * most),
+                .factor = state->corral,
+                .v = state->small,
+                .gradient = state->small + most};
+  if (!fill_gram(m, region, c, &p)) return EP_ERR_NUMERIC;
+  const ep_status status = nearest_point(&p);
+  w[region] = p.w[0];
+  for (int i = 1; i < count; i++) w[regions + shape[i] - 1] = p.w[i];
+  return status;
+}
+
+ep_status ep_example_weights(ep_state *state, const double *c, double *w) {
+  const int regions = ep_model_regions(state->model);
+  if (state->model->size.k == 0) {
     w[0] = 1;
     return EP_OK;
   }
-  polytope p = {.count = count,
-                .gram = state->gram,
-                .w = w,
-                .corral = (int *)(void *)(state->small + 2 * count),
-                .factor = state->corral,
-                .v = state->small,
-                .gradient = state->small + count};
-  if (!fill_gram(m, c, &p)) return EP_ERR_NUMERIC;
-  return nearest_point(&p);
+  for (int g = 0; g < regions; g++) {
+    const ep_status status = region_weights(state, g, c, w);
+    if (status != EP_OK) return status;
+  }
+  return EP_OK;
 }

@@ -20,6 +20,19 @@ typedef struct builder {
   arrays a;
 } builder;
 
+static ep_status check_regions(const ep_model_parts *p, ep_error *err) {
+  for (int g = 0; g < p->regions; g++) {
+    int examples = 0;
+    for (int i = 0; i < p->basis->examples; i++) examples += p->example_region[i] == g;
+    if (p->region[g].m < 1 || p->region[g].m > p->lb->m)
+      return ep_fail(err, EP_ERR_ARGUMENT,
+                     "region %d wants %d eigenfunctions, the Laplace-Beltrami space has %d", g,
+                     p->region[g].m, p->lb->m);
+    if (!examples) return ep_fail(err, EP_ERR_ARGUMENT, "region %d has no example", g);
+  }
+  return EP_OK;
+}
+
 static ep_status check_parts(const ep_model_parts *p, ep_error *err) {
   if (p->basis->n != p->fem->mesh->nv)
     return ep_fail(err, EP_ERR_ARGUMENT, "the basis is of another mesh (%d vertices, not %d)",
@@ -36,6 +49,7 @@ static ep_status check_parts(const ep_model_parts *p, ep_error *err) {
     return ep_fail(err, EP_ERR_ARGUMENT,
                    "%d eigenfunctions wanted, the Laplace-Beltrami space has %d on %d vertices",
                    p->m, p->lb->m, p->lb->n);
+  EP_TRY(check_regions(p, err));
   if (p->green && (p->green->r != p->basis->r || p->green->k != p->basis->examples))
     return ep_fail(err, EP_ERR_ARGUMENT, "the Green-strain coefficients are of another basis");
   if (p->basis->examples > 0 && p->m == 0 && !p->green)
@@ -57,8 +71,9 @@ static ep_status allocate(builder *b, ep_model_memory *out, ep_error *err) {
   const ep_model_sizes *z = &b->size;
   int n = z->n, nt = z->nt, r = z->r, m = z->m, k = z->k, s = z->s, blocks = z->blocks;
   int greens = z->greens, cubic = z->cubic, cubic_float = z->cubic_float, rigid = z->rigid;
+  int regions = z->regions;
   (void)n, (void)nt, (void)r, (void)m, (void)k, (void)s, (void)blocks, (void)greens, (void)cubic,
-      (void)cubic_float, (void)rigid;
+      (void)cubic_float, (void)rigid, (void)regions;
   const int contacts = z->contacts, nodes = z->nodes;
 #define X(type, name, d1, d2, d3)                                                                  \
   if ((size_t)(d1) * (size_t)(d2) * (size_t)(d3) > 0) {                                            \
@@ -85,14 +100,28 @@ static void copy_mesh_and_modes(builder *b) {
     memcpy(b->a.example_q, basis->example_q, (size_t)basis->examples * r * sizeof(double));
 }
 
-// M phi of descriptor function f: the constant one first where the object is held.
-static void weighted_function(const builder *b, int f, double *work, double *out) {
+static ep_region_part everywhere(const ep_model_parts *p) {
+  return (ep_region_part){.weight = NULL, .m = p->m};
+}
+
+// Whether the constant function belongs to the region's descriptor: its mean displacement means
+// something only where the region is held.
+static int constants(const ep_model_parts *p, const ep_region_part *region) {
+  return p->fem->nheld > 0 && !ep_region_carried(p->fem, region);
+}
+
+// M phi of function f of a region: the constant one first where it is held.
+static void weighted_function(const builder *b, const ep_region_part *region, int f, double *work,
+                              double *out) {
   const ep_lb *lb = b->parts->lb;
-  const int constant = b->size.m - b->parts->m;
+  const int constant = constants(b->parts, region);
   for (int i = 0; i < lb->n; i++)
     work[i] = f < constant ? 1 / sqrt(lb->volume)
                            : lb->phi[(size_t)(f - constant) * (size_t)lb->n + (size_t)i];
-  ep_csr_multiply(b->parts->lb_mass, 1, work, out);
+  if (region->weight)
+    ep_region_mass(b->parts->fem->mesh, region, work, out);
+  else
+    ep_csr_multiply(b->parts->lb_mass, 1, work, out);
 }
 
 // row of c (3) = (M phi)^T x
@@ -102,27 +131,53 @@ static void describe(int n, const double *mphi, const double *x, double c[3]) {
     for (int a = 0; a < 3; a++) c[a] += mphi[i] * x[3 * (size_t)i + (size_t)a];
 }
 
+// Function f of a region becomes function `at` of the model. work (2 n).
+static void describe_function(builder *b, const ep_region_part *region, int f, int at,
+                              double *work) {
+  const int n = b->size.n, r = b->size.r;
+  double *mphi = work + n, c[3];
+  weighted_function(b, region, f, work, mphi);
+  describe(n, mphi, b->a.rest_x, b->a.c0 + 3 * at);
+  for (int j = 0; j < r; j++) {
+    describe(n, mphi, b->a.u + (size_t)j * 3 * (size_t)n, c);
+    for (int a = 0; a < 3; a++) b->a.t[(size_t)(3 * at + a) * (size_t)r + (size_t)j] = c[a];
+  }
+  for (int i = 0; b->a.region_mean && i < n; i++) b->a.region_mean[at] += mphi[i];
+}
+
 static ep_status build_descriptors(builder *b, ep_error *err) {
-  const int n = b->size.n, r = b->size.r, m = b->size.m;
-  double *work = malloc(2 * (size_t)n * sizeof *work);
+  const ep_model_parts *p = b->parts;
+  const ep_region_part whole = everywhere(p);
+  double *work = malloc(2 * (size_t)b->size.n * sizeof *work);
   if (!work) return ep_fail(err, EP_ERR_MEMORY, "no memory for the model's descriptors");
-  for (int f = 0; f < m; f++) {
-    double *mphi = work + n, c[3];
-    weighted_function(b, f, work, mphi);
-    describe(n, mphi, b->a.rest_x, b->a.c0 + 3 * f);
-    for (int j = 0; j < r; j++) {
-      describe(n, mphi, b->a.u + (size_t)j * 3 * (size_t)n, c);
-      for (int a = 0; a < 3; a++) b->a.t[(size_t)(3 * f + a) * (size_t)r + (size_t)j] = c[a];
-    }
+  int at = 0;
+  for (int g = 0; g < (p->regions ? p->regions : 1); g++) {
+    const ep_region_part *region = p->regions ? &p->region[g] : &whole;
+    const int functions = region->m + constants(p, region);
+    for (int f = 0; f < functions; f++) describe_function(b, region, f, at++, work);
+    if (p->regions) b->a.region_first[g + 1] = at;
   }
   free(work);
-  for (int i = 0; i < b->size.k; i++)
-    for (int row = 0; row < 3 * m; row++) {
-      double sum = b->a.c0[row];
-      for (int j = 0; j < r; j++)
-        sum += b->a.t[(size_t)row * (size_t)r + (size_t)j] * b->a.example_q[i * r + j];
-      b->a.example_c[i * 3 * m + row] = sum;
+  return EP_OK;
+}
+
+// Where regions act, and how the motion of one that is carried is told.
+static ep_status build_regions(builder *b, ep_error *err) {
+  const ep_model_parts *p = b->parts;
+  const size_t r = (size_t)b->size.r, s = (size_t)b->size.s;
+  for (int i = 0; b->size.regions && i < b->size.k; i++)
+    b->a.example_region[i] = p->example_region[i];
+  for (size_t g = 0; g < (size_t)b->size.regions; g++) {
+    for (size_t j = 0; j < s; j++) {
+      const double share = ep_region_share(p->fem->mesh, &p->region[g], p->tet[j]);
+      b->a.region_inside[g * s + j] = share * p->weight[j];
+      b->a.region_outside[g * s + j] = (1 - share) * p->weight[j];
     }
+    if (!ep_region_carried(p->fem, &p->region[g])) continue;
+    b->a.region_carried[g] = 1;
+    EP_TRY(ep_region_motion(p->basis, p->fem->mesh, &p->region[g], b->a.region_motion + g * 12 * r,
+                            b->a.region_motion_rest + g * 12, err));
+  }
   return EP_OK;
 }
 
@@ -152,6 +207,10 @@ static void example_at_element(builder *b, int example, int j, const double *g) 
     for (int a = 0; a < r; a++) f[i] += g[(size_t)i * (size_t)r + (size_t)a] * q[a];
   }
   b->a.example_w[at] = b->parts->weight[j] * ep_reference_element(f, b->a.example_finv + 9 * at);
+  if (b->size.regions)
+    b->a.example_w[at] *=
+        ep_region_share(b->parts->fem->mesh, &b->parts->region[b->parts->example_region[example]],
+                        b->parts->tet[j]);
 }
 
 static void fill_cubature(builder *b, double *g) {
@@ -254,12 +313,16 @@ static int cubic_size(const ep_model_parts *p, ep_precision precision) {
 }
 
 static ep_model_sizes sizes_of(const ep_model_parts *p) {
-  const int constants = p->m > 0 && p->fem->nheld > 0 ? 1 : 0;
+  const ep_region_part whole = everywhere(p);
+  int m = p->m > 0 ? p->m + constants(p, &whole) : 0;
+  if (p->regions) m = 0;
+  for (int g = 0; g < p->regions; g++) m += p->region[g].m + constants(p, &p->region[g]);
   return (ep_model_sizes){.n = p->fem->mesh->nv,
                           .nt = p->fem->mesh->nt,
                           .r = p->basis->r,
-                          .m = p->m + constants,
+                          .m = m,
                           .k = p->basis->examples,
+                          .regions = p->regions,
                           .s = p->s,
                           .blocks = (p->basis->r + 7) / 8,
                           .greens = p->green ? p->green->count : 0,
@@ -277,6 +340,7 @@ ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_e
   EP_TRY_GOTO(status, allocate(&b, out, err), fail);
   copy_mesh_and_modes(&b);
   if (b.size.m > 0) EP_TRY_GOTO(status, build_descriptors(&b, err), fail);
+  EP_TRY_GOTO(status, build_regions(&b, err), fail);
   EP_TRY_GOTO(status, build_cubature(&b, err), fail);
   fill_green(&b);
   fill_contact(&b);
@@ -287,6 +351,9 @@ ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_e
 #define X(type, name, d1, d2, d3) out->model.name = b.a.name;
   EP_MODEL_ARRAYS(X)
 #undef X
+  // With the model's own function: that of a region may not be linear in q.
+  for (int i = 0; b.size.m > 0 && i < b.size.k; i++)
+    ep_descriptor(&out->model, b.a.example_q + i * b.size.r, b.a.example_c + i * 3 * b.size.m);
   out->model.evaluator = !parts->cubic                   ? EP_EVALUATE_CUBATURE
                          : parts->precision == EP_DOUBLE ? EP_EVALUATE_CUBIC
                                                          : EP_EVALUATE_CUBIC_FLOAT;
