@@ -13,6 +13,10 @@ endif()
 if(EP_FUZZ)
   add_compile_options(-fsanitize=fuzzer-no-link) # coverage of every library for the targets
 endif()
+if(EP_SANITIZE_THREAD)
+  add_compile_options(-fsanitize=thread -fno-omit-frame-pointer -g)
+  add_link_options(-fsanitize=thread)
+endif()
 include_directories(${CMAKE_SOURCE_DIR})
 
 # A static library of one folder; headers are included as "folder/name.h".
