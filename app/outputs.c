@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "app/obstacle_mesh.h"
 #include "mesh/io.h"
 #include "results/csv.h"
 #include "results/gltf.h"
@@ -65,9 +66,94 @@ static ep_status write_vtu(const char *folder, const ep_mesh *mesh, const ep_mod
   return status;
 }
 
+// What the run's frames fill, every 16th of them: where planes are to be seen.
+static void bounds_of_run(const ep_mesh *mesh, const ep_model *model, const ep_record *record,
+                          double *x, double low[3], double high[3]) {
+  const int stride = record->rows / 16 + 1;
+  ep_mesh_bounds(mesh, low, high);
+  for (int row = 0; row < record->rows; row += stride) {
+    ep_positions(model, record->q + (size_t)row * (size_t)model->size.r, x);
+    for (int i = 0; i < 3 * mesh->nv; i++) {
+      low[i % 3] = fmin(low[i % 3], x[i]);
+      high[i % 3] = fmax(high[i % 3], x[i]);
+    }
+  }
+}
+
+static ep_status make_solids(const ep_scene *scene, const ep_mesh *mesh, const ep_model *model,
+                             const ep_record *record, ep_solids *out, ep_error *err) {
+  double low[3], high[3];
+  double *x = malloc(3 * (size_t)mesh->nv * sizeof *x);
+  if (!x) return no_memory(err);
+  bounds_of_run(mesh, model, record, x, low, high);
+  free(x);
+  return ep_solids_make(scene, low, high, out, err);
+}
+
+// frames/obstacles-0000.vtu .. and obstacles.pvd.
+static ep_status write_obstacles_vtu(const char *folder, const ep_scene *scene,
+                                     const ep_solids *solids, const ep_record *record, int frames,
+                                     const int *row, ep_error *err) {
+  const size_t count = (size_t)frames;
+  char path[EP_PATH_MAX];
+  char(*name)[PATH_SHORT] = calloc(count, sizeof *name);
+  const char **names = calloc(count, sizeof *names);
+  double *time = calloc(count, sizeof *time), *x = calloc(3 * (size_t)solids->mesh.nv, sizeof *x);
+  ep_status status = name && names && time && x ? EP_OK : no_memory(err);
+  for (int i = 0; i < frames && status == EP_OK; i++) {
+    snprintf(name[i], sizeof name[i], "frames/obstacles-%04d.vtu", i);
+    names[i] = name[i];
+    time[i] = record->time[row[i]];
+    ep_solids_place(scene, solids, time[i], x);
+    status = ep_path_join(folder, name[i], path, err);
+    if (status == EP_OK) status = ep_mesh_write_vtu(path, &solids->mesh, x, 0, NULL, 0, NULL, err);
+  }
+  if (status == EP_OK) status = ep_path_join(folder, "obstacles.pvd", path, err);
+  if (status == EP_OK) status = ep_mesh_write_pvd(path, frames, time, names, err);
+  free(name);
+  free(names);
+  free(time);
+  free(x);
+  return status;
+}
+
+// Each obstacle as a body of its own, with its pose in every frame.
+static ep_status make_gltf_solids(const ep_scene *scene, const ep_solids *solids, int frames,
+                                  const double *time, ep_gltf_animation *a, ep_error *err) {
+  const size_t count = (size_t)scene->nobstacles;
+  if (!count) return EP_OK;
+  ep_gltf_solid *solid = calloc(count, sizeof *solid);
+  double *pose = calloc(count * (size_t)frames * 12, sizeof *pose);
+  a->solid = solid;
+  if (!solid || !pose) {
+    free(pose);
+    free(solid);
+    a->solid = NULL;
+    return no_memory(err);
+  }
+  a->solids = (int)count;
+  for (size_t i = 0; i < count; i++) {
+    double *to = pose + i * (size_t)frames * 12;
+    solid[i] =
+        (ep_gltf_solid){.n = solids->mesh.nv,
+                        .x = solids->mesh.x,
+                        .triangles = solids->first_triangle[i + 1] - solids->first_triangle[i],
+                        .triangle = solids->triangle + 3 * (size_t)solids->first_triangle[i],
+                        .flat = scene->obstacle[i].kind != EP_OBSTACLE_SPHERE,
+                        .pose = to};
+    for (int f = 0; f < frames; f++) {
+      ep_frame at;
+      ep_obstacle_pose(&scene->obstacle[i], time[f], &at);
+      memcpy(to + 12 * (size_t)f, at.c, sizeof at.c);
+      memcpy(to + 12 * (size_t)f + 3, at.R, sizeof at.R);
+    }
+  }
+  return EP_OK;
+}
+
 static ep_status write_glb(const char *folder, const ep_scene *scene, const ep_mesh *mesh,
                            const ep_model *model, const ep_record *record, int frames,
-                           const int *row, ep_error *err) {
+                           const int *row, const ep_solids *solids, ep_error *err) {
   const size_t r = (size_t)model->size.r;
   char path[EP_PATH_MAX];
   int *triangle = NULL;
@@ -89,7 +175,12 @@ static ep_status write_glb(const char *folder, const ep_scene *scene, const ep_m
     a.q = q;
     a.time = time;
     a.triangle = triangle;
-    status = ep_gltf_write(path, &a, err);
+    status = make_gltf_solids(scene, solids, frames, time, &a, err);
+  }
+  if (status == EP_OK) status = ep_gltf_write(path, &a, err);
+  if (a.solid) {
+    free((void *)a.solid[0].pose);
+    free((void *)a.solid);
   }
   free(triangle);
   free(q);
@@ -100,15 +191,17 @@ static ep_status write_glb(const char *folder, const ep_scene *scene, const ep_m
 
 // Panels: rest, equally spaced moments, the end; then each example as the object would wear it.
 static ep_status write_png(const char *folder, const ep_scene *scene, const ep_mesh *mesh,
-                           const ep_model *model, const ep_record *record, ep_error *err) {
+                           const ep_model *model, const ep_record *record, const ep_solids *solids,
+                           ep_error *err) {
   const int examples = model->size.k < 3 ? model->size.k : 3;
   const int moments = record->rows < PANELS ? record->rows : PANELS;
   const size_t n3 = 3 * (size_t)mesh->nv, r = (size_t)model->size.r;
   char path[EP_PATH_MAX], label[PANELS + 3][PATH_SHORT];
-  ep_drawing drawing[PANELS + 3];
+  ep_drawing drawing[2 * (PANELS + 3)];
   ep_panel panel[PANELS + 3];
   int triangles, *triangle = NULL, count = moments + examples;
-  double *x = calloc((size_t)count * n3, sizeof *x);
+  const size_t solid3 = 3 * (size_t)solids->mesh.nv;
+  double *x = calloc((size_t)count * n3 + (size_t)moments * solid3, sizeof *x);
   ep_status status = x ? ep_mesh_surface(mesh, &triangles, &triangle, err) : no_memory(err);
   for (int i = 0; i < count && status == EP_OK; i++) {
     const int row = moments > 1 ? i * (record->rows - 1) / (moments - 1) : 0;
@@ -120,12 +213,20 @@ static ep_status write_png(const char *folder, const ep_scene *scene, const ep_m
       ep_positions(model, model->example_q + (size_t)(i - moments) * r, at);
       snprintf(label[i], sizeof label[i], "example %d", i - moments + 1);
     }
-    drawing[i] = ep_default_drawing(mesh->nv, at, triangles, triangle);
+    drawing[2 * i] = ep_default_drawing(mesh->nv, at, triangles, triangle);
     if (i >= moments) {
       const float tint[3] = {0.85f, 0.55f, 0.25f};
-      memcpy(drawing[i].tint, tint, sizeof tint);
+      memcpy(drawing[2 * i].tint, tint, sizeof tint);
     }
-    panel[i] = (ep_panel){.drawings = 1, .drawing = &drawing[i], .label = label[i]};
+    panel[i] = (ep_panel){.drawings = 1, .drawing = &drawing[2 * i], .label = label[i]};
+    if (i >= moments || !solids->triangles) continue;
+    double *there = x + (size_t)count * n3 + (size_t)i * solid3;
+    const float grey[3] = {0.72f, 0.72f, 0.70f};
+    ep_solids_place(scene, solids, record->time[row], there);
+    drawing[2 * i + 1] =
+        ep_default_drawing(solids->mesh.nv, there, solids->triangles, solids->triangle);
+    memcpy(drawing[2 * i + 1].tint, grey, sizeof grey);
+    panel[i].drawings = 2;
   }
   if (status == EP_OK) status = ep_path_join(folder, "strip.png", path, err);
   if (status == EP_OK) {
@@ -158,8 +259,12 @@ static ep_status write_csv(const char *folder, const ep_model *model, const ep_r
        .components = green ? model->size.k : 0,
        .data = record->green_weights,
        .numbered = true},
+      {.name = "contact", // touching, penetration, force x y z
+       .components = record->contact ? EP_CONTACT_COLUMNS : 0,
+       .data = record->contact,
+       .numbered = true},
   };
-  return ep_csv_write(path, record->rows, 4, groups, err);
+  return ep_csv_write(path, record->rows, 5, groups, err);
 }
 
 ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_shapes *shapes,
@@ -172,13 +277,17 @@ ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_s
   int *row = malloc(((size_t)record->rows + 1) * sizeof *row);
   if (!row) return no_memory(err);
   const int frames = frame_rows(scene, record, row);
-  ep_status status = EP_OK;
-  if (scene->formats & EP_FORMAT_VTU)
+  ep_solids solids;
+  ep_status status = make_solids(scene, mesh, model, record, &solids, err);
+  if (status == EP_OK && (scene->formats & EP_FORMAT_VTU))
     status = write_vtu(folder, mesh, model, record, frames, row, log, err);
+  if (status == EP_OK && (scene->formats & EP_FORMAT_VTU) && solids.triangles)
+    status = write_obstacles_vtu(folder, scene, &solids, record, frames, row, err);
   if (status == EP_OK && (scene->formats & EP_FORMAT_GLB))
-    status = write_glb(folder, scene, mesh, model, record, frames, row, err);
+    status = write_glb(folder, scene, mesh, model, record, frames, row, &solids, err);
   if (status == EP_OK && (scene->formats & EP_FORMAT_PNG))
-    status = write_png(folder, scene, mesh, model, record, err);
+    status = write_png(folder, scene, mesh, model, record, &solids, err);
+  ep_solids_free(&solids);
   free(row);
   return status;
 }
@@ -226,6 +335,14 @@ void ep_summary_text(FILE *out, const json_t *report) {
           number(report, "steps_done"), number(report, "steps"), number(report, "dt"),
           number(report, "t_step_ms"), number(report, "t_interp_ms"));
   text_weights(out, report);
+  const json_t *contact = json_object_get(report, "contact");
+  if (contact)
+    fprintf(
+        out,
+        "contact: up to %.0f vertices touch; deepest %.3g m, %.2f %% of the diagonal; stiffness "
+        "raised up to %.3g times\n",
+        number(contact, "touching"), number(contact, "penetration"),
+        100 * number(contact, "penetration_share"), number(contact, "stiffness_raised"));
   fprintf(out, "inverted tets: at most %.0f after any step\n", number(report, "inverted_tets"));
 }
 

@@ -85,6 +85,12 @@ static void add_timing(json_t *report, const ep_record *record) {
   json_object_set_new(report, "halved_steps", json_integer(record->halvings));
 }
 
+static json_t *contact_of(const ep_model *model, const ep_record *record) {
+  return json_pack("{s:i, s:f, s:f, s:f, s:f}", "touching", record->most_touching, "penetration",
+                   record->deepest, "penetration_share", record->deepest / model->rest_scale,
+                   "stiffness_raised", record->most_raised, "energy_injected", record->injected);
+}
+
 // The run's JSON object; out names the folder of the results.
 static json_t *make_report(const ep_session *session, const ep_model_file *file,
                            const ep_record *record, const char *folder) {
@@ -116,6 +122,7 @@ static json_t *make_report(const ep_session *session, const ep_model_file *file,
   json_object_set_new(report, "cubature_error",
                       json_pack("{s:o, s:o}", "train", ep_json_number(file->train_error),
                                 "held_out", ep_json_number(file->held_out_error)));
+  if (record->contact) json_object_set_new(report, "contact", contact_of(model, record));
   json_object_set_new(report, "inverted_tets", json_integer(record->max_inverted));
   double largest = NAN;
   if (last >= 0)

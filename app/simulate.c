@@ -28,6 +28,7 @@ typedef struct simulation {
   double *force;           // (r) of the step at hand
   ep_obstacle *obstacle;   // (nobstacles) where they are in the step at hand
   double elastic, kinetic; // of the last step
+  ep_contact_report contact;
   ep_record *record;
 } simulation;
 
@@ -108,6 +109,15 @@ static void set_force(simulation *s, double t) {
   }
 }
 
+static void note_contact(simulation *s, const ep_contact_report *contact) {
+  ep_record *record = s->record;
+  s->contact = *contact;
+  record->deepest = fmax(record->deepest, contact->deepest);
+  record->most_raised = fmax(record->most_raised, contact->raised);
+  record->injected += contact->injected;
+  if (contact->touching > record->most_touching) record->most_touching = contact->touching;
+}
+
 // Advance by dt from time t; a failed step is done in two halves, down to 2^-6 of the step.
 static ep_status advance(simulation *s, double t, double dt, int level) {
   ep_step_report report = {0};
@@ -118,6 +128,7 @@ static ep_status advance(simulation *s, double t, double dt, int level) {
   s->record->newton_iterations += report.newton_iterations;
   s->elastic = report.elastic_energy;
   s->kinetic = report.kinetic_energy;
+  if (status == EP_OK) note_contact(s, &report.contact);
   if (status != EP_ERR_NUMERIC || level == HALVINGS_MAX) return status;
   s->record->halvings++;
   const ep_status first = advance(s, t, dt / 2, level + 1);
@@ -138,8 +149,10 @@ static ep_status make_record(const ep_scene *scene, const ep_model *model, ep_re
   const bool lb = model->size.k && model->size.m, green = model->size.greens > 0;
   if (lb) out->weights = calloc(rows * shapes, sizeof *out->weights);
   if (green) out->green_weights = calloc(rows * shapes, sizeof *out->green_weights);
-  const bool good = out->time && out->q && out->velocity && out->energy && out->step_ms &&
-                    out->target_ms && (out->weights || !lb) && (out->green_weights || !green);
+  if (scene->nobstacles) out->contact = calloc(rows * EP_CONTACT_COLUMNS, sizeof *out->contact);
+  const bool good = (out->contact || !scene->nobstacles) && out->time && out->q && out->velocity &&
+                    out->energy && out->step_ms && out->target_ms && (out->weights || !lb) &&
+                    (out->green_weights || !green);
   if (good) return EP_OK;
   ep_record_free(out);
   return ep_fail(err, EP_ERR_MEMORY, "no memory for %d steps of %d modes", scene->steps,
@@ -164,6 +177,12 @@ static ep_status note(simulation *s, const ep_mesh *mesh, double *x) {
   memcpy(record->q + row * r, ep_state_q(s->state), r * sizeof *record->q);
   memcpy(record->velocity + row * r, ep_state_velocity(s->state), r * sizeof *record->velocity);
   record->energy[row] = s->elastic + s->kinetic;
+  if (record->contact) {
+    double *to = record->contact + row * EP_CONTACT_COLUMNS;
+    to[EP_CONTACT_TOUCHING] = s->contact.touching;
+    to[EP_CONTACT_DEEPEST] = s->contact.deepest;
+    memcpy(to + EP_CONTACT_FORCE, s->contact.force, sizeof s->contact.force);
+  }
   if (record->weights) {
     const ep_status status =
         note_weights(s, record->weights + row * (size_t)(s->model->size.k + 1));
@@ -278,6 +297,7 @@ void ep_record_free(ep_record *record) {
   free(record->energy);
   free(record->weights);
   free(record->green_weights);
+  free(record->contact);
   free(record->step_ms);
   free(record->target_ms);
   memset(record, 0, sizeof *record);

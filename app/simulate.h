@@ -5,6 +5,10 @@
 #include "app/model_file.h"
 #include "app/shapes.h"
 
+// Of contact after each step: vertices that touch, deepest penetration [m], force on the object
+// [N].
+enum { EP_CONTACT_TOUCHING, EP_CONTACT_DEEPEST, EP_CONTACT_FORCE, EP_CONTACT_COLUMNS = 5 };
+
 typedef struct ep_record {
   int rows;              // steps done + 1 (row 0 is rest)
   double *time;          // (rows) [s]
@@ -13,11 +17,15 @@ typedef struct ep_record {
   double *energy;        // (rows) elastic + kinetic, by the model's own quadrature [J]
   double *weights;       // (rows x (k + 1)), the rest shape's first; NULL without that path
   double *green_weights; // (rows x k) of the Green-strain path; NULL without it
+  double *contact;       // (rows x EP_CONTACT_COLUMNS); NULL without obstacles
   double *step_ms;       // (rows - 1) wall time of each step, interpolation included
   double *target_ms;     // (rows - 1) of the interpolation alone
   int max_inverted;      // most inverted tets after any step
   int halvings;          // steps that had to be halved
   int newton_iterations, target_evaluations; // over the run
+  int most_touching;                         // vertices at the end of any step
+  double deepest;                            // penetration at the end of any step [m]
+  double most_raised, injected;              // of ep_contact_report: the most, the sum
 } ep_record;
 
 // Simulate scene->steps steps. What was done before a failure stays in the record.

@@ -14,6 +14,7 @@ enum { CHUNK_JSON = 0x4E4F534A, CHUNK_BIN = 0x004E4942, MAGIC = 0x46546C67 };
 
 typedef struct writer {
   const ep_gltf_animation *a;
+  bool flat;                                     // no normals: viewers then shade flat
   int nv;                                        // vertices on the surface
   int *vertex;                                   // (nv) surface vertex -> vertex
   uint32_t *index;                               // (triangles x 3) in surface vertices
@@ -188,9 +189,11 @@ static ep_status add_floats(writer *w, const float *data, size_t count, int comp
                             bool bounded, int *accessor) {
   int view;
   EP_TRY(append(w, data, count * (size_t)components * sizeof *data, target, &view));
-  json_t *entry =
-      json_pack("{s:i, s:i, s:I, s:s}", "bufferView", view, "componentType", FLOAT, "count",
-                (json_int_t)count, "type", components == 3 ? "VEC3" : "SCALAR");
+  json_t *entry = json_pack("{s:i, s:i, s:I, s:s}", "bufferView", view, "componentType", FLOAT,
+                            "count", (json_int_t)count, "type",
+                            components == 4   ? "VEC4"
+                            : components == 3 ? "VEC3"
+                                              : "SCALAR");
   if (entry && bounded) {
     json_object_set_new(entry, "min", bounds(data, count, components, false));
     json_object_set_new(entry, "max", bounds(data, count, components, true));
@@ -252,13 +255,26 @@ static ep_status add_primitive(writer *w, json_t *primitive) {
   make_base(w);
   EP_TRY(add_floats(w, w->base, (size_t)w->nv, 3, ARRAY_BUFFER, true, &accessor));
   json_object_set_new(attributes, "POSITION", json_integer(accessor));
-  make_normals(w, NULL, w->base_normal);
-  EP_TRY(add_floats(w, w->base_normal, (size_t)w->nv, 3, ARRAY_BUFFER, false, &accessor));
-  json_object_set_new(attributes, "NORMAL", json_integer(accessor));
+  if (!w->flat) {
+    make_normals(w, NULL, w->base_normal);
+    EP_TRY(add_floats(w, w->base_normal, (size_t)w->nv, 3, ARRAY_BUFFER, false, &accessor));
+    json_object_set_new(attributes, "NORMAL", json_integer(accessor));
+  }
   EP_TRY(add_colors(w, attributes));
   EP_TRY(add_targets(w, targets));
   if (w->a->r == 0) json_object_del(primitive, "targets");
   return EP_OK;
+}
+
+static void free_arrays(writer *w) {
+  free(w->vertex);
+  free(w->index);
+  free(w->low);
+  free(w->range);
+  free(w->base);
+  free(w->base_normal);
+  free(w->position);
+  free(w->normal);
 }
 
 // ---- animation -------------------------------------------------------------------------------
@@ -268,27 +284,119 @@ static float weight(const writer *w, int frame, int mode) {
   return (float)((q - w->low[mode]) / w->range[mode]);
 }
 
+// One thing of one node over time.
+typedef struct channels {
+  json_t *channel, *sampler;
+  int input; // accessor of the times
+} channels;
+
+static ep_status add_channel(writer *w, channels *c, const float *values, size_t count,
+                             int components, int node, const char *path) {
+  int output;
+  EP_TRY(add_floats(w, values, count, components, 0, false, &output));
+  json_array_append_new(c->channel, json_pack("{s:i, s:{s:i, s:s}}", "sampler",
+                                              (int)json_array_size(c->sampler), "target", "node",
+                                              node, "path", path));
+  json_array_append_new(c->sampler, json_pack("{s:i, s:i, s:s}", "input", c->input, "output",
+                                              output, "interpolation", "LINEAR"));
+  return EP_OK;
+}
+
+static ep_status add_weights(writer *w, channels *c, float *values) {
+  const ep_gltf_animation *a = w->a;
+  for (int f = 0; f < a->frames; f++)
+    for (int i = 0; i < a->r; i++) values[(size_t)f * (size_t)a->r + (size_t)i] = weight(w, f, i);
+  return add_channel(w, c, values, (size_t)a->frames * (size_t)a->r, 1, 0, "weights");
+}
+
+// Unit quaternion (x, y, z, w) of a rotation, on the side of the one before.
+static void quaternion(const double R[9], const float *before, float q[4]) {
+  const double trace[4] = {R[0] - R[4] - R[8], R[4] - R[0] - R[8], R[8] - R[0] - R[4],
+                           R[0] + R[4] + R[8]};
+  int most = 0;
+  for (int i = 1; i < 4; i++)
+    if (trace[i] > trace[most]) most = i;
+  double v[4];
+  v[most] = 1 + trace[most];
+  const double skew[3] = {R[7] - R[5], R[2] - R[6], R[3] - R[1]};
+  for (int i = 0; i < 3; i++) {
+    if (most == 3)
+      v[i] = skew[i];
+    else if (i != most)
+      v[i] = R[3 * i + most] + R[3 * most + i];
+  }
+  if (most < 3) v[3] = skew[most];
+  const double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + v[3] * v[3]);
+  double same = 0;
+  for (int i = 0; before && i < 4; i++) same += v[i] * (double)before[i];
+  for (int i = 0; i < 4; i++) q[i] = (float)((same < 0 ? -v[i] : v[i]) / length);
+}
+
+static ep_status add_pose(writer *w, channels *c, const double *pose, int node, float *values) {
+  const int frames = w->a->frames;
+  if (!pose) return EP_OK;
+  for (int f = 0; f < frames; f++)
+    for (int i = 0; i < 3; i++) values[3 * f + i] = (float)pose[12 * (size_t)f + (size_t)i];
+  EP_TRY(add_channel(w, c, values, (size_t)frames, 3, node, "translation"));
+  for (int f = 0; f < frames; f++)
+    quaternion(pose + 12 * (size_t)f + 3, f ? values + 4 * (f - 1) : NULL, values + 4 * f);
+  return add_channel(w, c, values, (size_t)frames, 4, node, "rotation");
+}
+
+static ep_status add_channels(writer *w, channels *c, float *values) {
+  const ep_gltf_animation *a = w->a;
+  for (int f = 0; f < a->frames; f++) values[f] = (float)a->time[f];
+  EP_TRY(add_floats(w, values, (size_t)a->frames, 1, 0, true, &c->input));
+  if (a->r > 0) EP_TRY(add_weights(w, c, values));
+  EP_TRY(add_pose(w, c, a->pose, 0, values));
+  for (int i = 0; i < a->solids; i++) EP_TRY(add_pose(w, c, a->solid[i].pose, i + 1, values));
+  return EP_OK;
+}
+
 static ep_status add_animation(writer *w, json_t *root) {
   const ep_gltf_animation *a = w->a;
-  if (a->frames == 0 || a->r == 0) return EP_OK;
-  const size_t count = (size_t)a->frames * (size_t)a->r;
-  float *values = malloc((count + (size_t)a->frames) * sizeof *values), *times = values + count;
+  if (a->frames == 0 || (a->r == 0 && !a->pose && a->solids == 0)) return EP_OK;
+  const size_t most = (size_t)a->frames * (size_t)(a->r > 4 ? a->r : 4);
+  float *values = malloc(most * sizeof *values);
   if (!values) return ep_fail(w->err, EP_ERR_MEMORY, "no memory for %d glTF frames", a->frames);
-  for (int f = 0; f < a->frames; f++) {
-    times[f] = (float)a->time[f];
-    for (int i = 0; i < a->r; i++) values[(size_t)f * (size_t)a->r + (size_t)i] = weight(w, f, i);
-  }
-  int input, output;
-  ep_status status = add_floats(w, times, (size_t)a->frames, 1, 0, true, &input);
-  if (status == EP_OK) status = add_floats(w, values, count, 1, 0, false, &output);
+  channels c = {.channel = json_array(), .sampler = json_array()};
+  const ep_status status = add_channels(w, &c, values);
   free(values);
-  EP_TRY(status);
   json_object_set_new(root, "animations",
-                      json_pack("[{s:s, s:[{s:i, s:{s:i, s:s}}], s:[{s:i, s:i, s:s}]}]", "name",
-                                "trajectory", "channels", "sampler", 0, "target", "node", 0, "path",
-                                "weights", "samplers", "input", input, "output", output,
-                                "interpolation", "LINEAR"));
-  return EP_OK;
+                      json_pack("[{s:s, s:o, s:o}]", "name", "trajectory", "channels", c.channel,
+                                "samplers", c.sampler));
+  return status;
+}
+
+// A solid's mesh and node, with a writer of its own over the same buffer.
+static ep_status add_solid(writer *w, json_t *root, const ep_gltf_solid *solid, int number) {
+  const ep_gltf_animation still = {
+      .n = solid->n, .x = solid->x, .triangles = solid->triangles, .triangle = solid->triangle};
+  char name[32];
+  writer own = *w;
+  own.a = &still;
+  own.flat = solid->flat;
+  own.nv = 0;
+  own.vertex = NULL, own.index = NULL, own.low = NULL, own.range = NULL;
+  own.base = NULL, own.base_normal = NULL, own.position = NULL, own.normal = NULL;
+  json_t *primitive = json_object();
+  ep_status status = primitive ? make_index(&own) : EP_ERR_MEMORY;
+  if (status == EP_OK) status = make_ranges(&own);
+  if (status == EP_OK) status = add_primitive(&own, primitive);
+  w->bin = own.bin, w->used = own.used, w->capacity = own.capacity;
+  free_arrays(&own);
+  snprintf(name, sizeof name, "obstacle %d", number + 1);
+  if (status == EP_OK) {
+    json_object_set_new(primitive, "material", json_integer(1));
+    json_array_append_new(json_object_get(root, "meshes"),
+                          json_pack("{s:s, s:[O]}", "name", name, "primitives", primitive));
+    json_array_append_new(json_object_get(root, "nodes"),
+                          json_pack("{s:i, s:s}", "mesh", number + 1, "name", name));
+    json_t *scene = json_array_get(json_object_get(root, "scenes"), 0);
+    json_array_append_new(json_object_get(scene, "nodes"), json_integer(number + 1));
+  }
+  json_decref(primitive);
+  return status;
 }
 
 // Weights at the first frame (without frames: at rest), and the targets' names for editors.
@@ -318,6 +426,11 @@ static json_t *make_root(const writer *w) {
                       json_pack("[{s:{s:[f,f,f,f], s:f, s:f}, s:b}]", "pbrMetallicRoughness",
                                 "baseColorFactor", (double)c[0], (double)c[1], (double)c[2], 1.0,
                                 "metallicFactor", 0.0, "roughnessFactor", 0.6, "doubleSided", 1));
+  if (w->a->solids > 0) // grey, for what is in the way
+    json_array_append_new(json_object_get(root, "materials"),
+                          json_pack("{s:{s:[f,f,f,f], s:f, s:f}}", "pbrMetallicRoughness",
+                                    "baseColorFactor", 0.5, 0.5, 0.48, 1.0, "metallicFactor", 0.0,
+                                    "roughnessFactor", 0.8));
   return root;
 }
 
@@ -350,6 +463,7 @@ static ep_status write_all(const char *path, writer *w, json_t *root) {
   if (status == EP_OK) add_mesh(w, root, primitive);
   json_decref(primitive);
   EP_TRY(status);
+  for (int i = 0; i < w->a->solids; i++) EP_TRY(add_solid(w, root, &w->a->solid[i], i));
   EP_TRY(add_animation(w, root));
   json_object_set(root, "accessors", w->accessors);
   json_object_set(root, "bufferViews", w->views);
@@ -376,14 +490,7 @@ ep_status ep_gltf_write(const char *path, const ep_gltf_animation *animation, ep
   json_decref(root);
   json_decref(w.views);
   json_decref(w.accessors);
-  free(w.vertex);
-  free(w.index);
-  free(w.low);
-  free(w.range);
-  free(w.base);
-  free(w.base_normal);
-  free(w.position);
-  free(w.normal);
+  free_arrays(&w);
   free(w.bin);
   return status;
 }

@@ -11,6 +11,16 @@
 // trajectory: base shape X + sum_a U_a min_a, target a = U_a (max_a - min_a), weight a =
 // (q_a - min_a) / (max_a - min_a), 0 where a mode does not move. Hence base + sum of weight x
 // target = X + U q up to single precision. Only vertices that triangles use are stored.
+// A rigid body beside the object. Arrays are borrowed.
+typedef struct ep_gltf_solid {
+  int n;           // vertices of x; only those its triangles use are stored
+  const double *x; // (n x 3) in the body's own coordinates
+  int triangles;
+  const int *triangle; // (triangles x 3) outward
+  bool flat;           // faces shaded flat (boxes), else smoothly (spheres)
+  const double *pose;  // (frames x 12) position (3) and rotation (row-major 9) in every frame
+} ep_gltf_solid;
+
 typedef struct ep_gltf_animation {
   const char *name;    // of the node and the mesh
   int n, r, frames;    // vertices, modes (0: a still), frames (0: a still at rest)
@@ -22,7 +32,10 @@ typedef struct ep_gltf_animation {
   const int *triangle; // (triangles x 3) outward
   const float *color;  // (n x 3) linear RGB per vertex, or NULL
   float base_color[3]; // linear RGB of the material; white where `color` is given makes sense
-  bool target_normals; // store how each target changes the normals: larger, better lit
+  const double *pose;  // (frames x 12) where the object is as a whole, as of a solid; NULL: stays
+  int solids;
+  const ep_gltf_solid *solid; // (solids)
+  bool target_normals;        // store how each target changes the normals: larger, better lit
 } ep_gltf_animation;
 ep_gltf_animation ep_default_gltf(void);
 
