@@ -62,6 +62,9 @@ ep_status ep_bake_modes(ep_bake *bake, ep_error *err);
 ep_status ep_bake_paths(ep_bake *bake, ep_error *err);
 ep_status ep_bake_basis(ep_bake *bake, ep_error *err);
 ep_status ep_bake_cubature(ep_bake *bake, ep_error *err);
+// Share of each tet in the region of each example (examples x nt), malloc'd; NULL in *out where
+// every example acts everywhere.
+ep_status ep_bake_shares(const ep_bake *bake, double **out, ep_error *err);
 ep_status ep_bake_green(ep_bake *bake, ep_error *err);
 ep_status ep_bake_cubic(ep_bake *bake, ep_error *err);
 // The whole bake; path (EP_PATH_MAX) receives the model file in the cache. Stages that were not

@@ -5,9 +5,7 @@
 #include "app/bake.h"
 #include "app/regions.h"
 
-// Share of each tet in the region of each example. NULL in *out where every example acts
-// everywhere.
-static ep_status region_shares(const ep_bake *bake, double **out, ep_error *err) {
+ep_status ep_bake_shares(const ep_bake *bake, double **out, ep_error *err) {
   const ep_shapes *shapes = bake->shapes;
   const ep_mesh *mesh = &shapes->shape[0].mesh;
   *out = NULL;
@@ -41,7 +39,7 @@ static ep_status compute(ep_bake *bake, ep_bake_step *step, ep_error *err) {
   EP_TRY(ep_bake_fem(bake, err));
   EP_TRY(ep_bake_compute(bake, step, err));
   ep_status status = quadrature(bake, &weight, err);
-  if (status == EP_OK) status = region_shares(bake, &share, err);
+  if (status == EP_OK) status = ep_bake_shares(bake, &share, err);
   if (status == EP_OK)
     status = ep_green_coefficients_compute(&bake->fem, &bake->basis, NULL, weight, share, bake->log,
                                            g, err);

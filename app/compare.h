@@ -23,6 +23,7 @@
   X(position_error, "position error") /* largest over vertices and time, over the diagonal */      \
   X(velocity_error, "velocity error") /* the same over the reference's largest speed */            \
   X(energy_error, "energy drift")     /* largest |E - E_ref| over the largest E_ref, E = W + T */  \
+  X(weight_error, "weights") /* largest difference of an example's weight from the reference's */  \
   X(newton_per_step, "Newton per step")                                                            \
   X(halvings, "halved steps")                                                                      \
   X(inverted, "inverted tets")
@@ -30,6 +31,7 @@
 typedef struct ep_point {
   ep_method method;
   ep_material material;
+  int path; // of the examples: EP_METHOD bits, 0 without examples
   int r, s; // s: elements used (cubic: for examples and penalty alone), 0 for full
   ep_precision precision;
   double dt;          // [s]
@@ -42,6 +44,9 @@ typedef struct ep_point {
   double *error_at; // (frames) position error over time
 } ep_point;
 
+// Weights of the examples stand in sets: the interpolation's, then the Green-strain path's.
+int ep_weight_sets(int path);
+
 // Times all runs meet at, every `every`-th of the longest time step.
 typedef struct ep_frames {
   int count;
@@ -49,9 +54,19 @@ typedef struct ep_frames {
   size_t n3;
   double *x, *v;  // (count x n3) displacements, velocities
   double *energy; // (count) elastic + kinetic
+  int nweights;   // sets x examples
+  double *weight; // (count x nweights)
 } ep_frames;
-ep_status ep_frames_make(int count, double interval, size_t n3, ep_frames *out, ep_error *err);
+ep_status ep_frames_make(int count, double interval, size_t n3, int nweights, ep_frames *out,
+                         ep_error *err);
 void ep_frames_free(ep_frames *frames);
+
+// The reference run of a path, for the sweep's first material: how the paths differ.
+typedef struct ep_path_run {
+  int path, nweights;
+  double *weight; // (frames x nweights)
+  double *apart;  // (frames) largest distance from the first path's run, over the diagonal
+} ep_path_run;
 
 typedef struct ep_comparison {
   const ep_scene *scene;
@@ -62,11 +77,13 @@ typedef struct ep_comparison {
   double frame_interval;
   int count;
   ep_point *point; // (count)
+  int paths;       // 0 without examples
+  ep_path_run path[EP_PATHS];
 } ep_comparison;
 
-// ---- one material and one r: everything of the bake up to the basis ---------------------------
+// ---- one material, path and r: everything of the bake up to the basis -------------------------
 typedef struct ep_bench {
-  ep_scene scene; // the given one with this r and material; its pointers are borrowed
+  ep_scene scene; // the given one with this r, material and path; its pointers are borrowed
   const ep_cache *cache;
   ep_log *log;
   ep_shapes shapes;
@@ -76,7 +93,7 @@ typedef struct ep_bench {
   double basis_seconds; // of the basis, always measured anew
 } ep_bench;
 // Reads the meshes and plans; ep_bench_prepare bakes (PETSc must run).
-ep_status ep_bench_open(const ep_scene *scene, ep_material material, int r, const ep_cache *cache,
+ep_status ep_bench_open(const ep_scene *scene, const ep_point *point, const ep_cache *cache,
                         ep_log *log, ep_bench *out, ep_error *err);
 ep_status ep_bench_prepare(ep_bench *bench, ep_error *err);
 void ep_bench_close(ep_bench *bench);
@@ -92,6 +109,8 @@ ep_status ep_bench_model(ep_bench *bench, const ep_cubature *c, const double *cu
 ep_status ep_compare_full(ep_bench *bench, ep_point *point, ep_frames *frames, ep_error *err);
 // The same for a reduced method.
 ep_status ep_compare_reduced(ep_bench *bench, ep_point *point, ep_frames *frames, ep_error *err);
+// Largest |a - b| over the vertices of displacements (n3); b NULL: 0.
+double ep_compare_farthest(size_t n3, const double *a, const double *b);
 // Errors of a run against the reference, into point.
 ep_status ep_compare_errors(const ep_frames *run, const ep_frames *reference, double diagonal,
                             ep_point *point, ep_error *err);

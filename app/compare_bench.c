@@ -6,14 +6,20 @@
 #include "app/hash_text.h"
 
 // Raised whenever a comparison measures something else.
-enum { COMPARE_VERSION = 1 };
+enum { COMPARE_VERSION = 2 };
 
-ep_status ep_frames_make(int count, double interval, size_t n3, ep_frames *out, ep_error *err) {
-  *out = (ep_frames){.count = count, .interval = interval, .n3 = n3};
+int ep_weight_sets(int path) {
+  return (path & EP_METHOD_LB ? 1 : 0) + (path & EP_METHOD_GREEN ? 1 : 0);
+}
+
+ep_status ep_frames_make(int count, double interval, size_t n3, int nweights, ep_frames *out,
+                         ep_error *err) {
+  *out = (ep_frames){.count = count, .interval = interval, .n3 = n3, .nweights = nweights};
   out->x = calloc((size_t)count * n3, sizeof *out->x);
   out->v = calloc((size_t)count * n3, sizeof *out->v);
   out->energy = calloc((size_t)count, sizeof *out->energy);
-  if (out->x && out->v && out->energy) return EP_OK;
+  out->weight = calloc((size_t)count * (size_t)nweights + 1, sizeof *out->weight);
+  if (out->x && out->v && out->energy && out->weight) return EP_OK;
   ep_frames_free(out);
   return ep_fail(err, EP_ERR_MEMORY, "no memory for %d frames of a comparison", count);
 }
@@ -22,14 +28,17 @@ void ep_frames_free(ep_frames *frames) {
   free(frames->x);
   free(frames->v);
   free(frames->energy);
+  free(frames->weight);
   *frames = (ep_frames){0};
 }
 
-ep_status ep_bench_open(const ep_scene *scene, ep_material material, int r, const ep_cache *cache,
+ep_status ep_bench_open(const ep_scene *scene, const ep_point *point, const ep_cache *cache,
                         ep_log *log, ep_bench *out, ep_error *err) {
   *out = (ep_bench){.scene = *scene, .cache = cache, .log = log};
-  out->scene.model = material;
-  out->scene.modes = r;
+  out->scene.model = point->material;
+  out->scene.modes = point->r;
+  out->scene.methods = point->path;
+  out->scene.green = point->path & EP_METHOD_GREEN ? scene->sweep.green : (ep_green){0};
   ep_status status = ep_shapes_read(&out->scene, log, &out->shapes, err);
   if (status == EP_OK) status = ep_plan_make(&out->scene, &out->shapes, &out->plan, err);
   if (status != EP_OK) ep_bench_close(out);
@@ -69,7 +78,7 @@ ep_status ep_bench_prepare(ep_bench *bench, ep_error *err) {
   if (bench->shapes.examples) {
     EP_TRY(ep_bake_poses(bake, err));
     EP_TRY(ep_bake_paths(bake, err));
-    EP_TRY(ep_bake_lb(bake, 0, err));
+    if (bench->scene.methods & EP_METHOD_LB) EP_TRY(ep_bake_lb(bake, 0, err));
   }
   EP_TRY(build_basis(bench, err));
   bench->open = true;
@@ -97,6 +106,8 @@ ep_digest ep_bench_key(const ep_bench *bench, const char *kind, const ep_frames 
   ep_hash_add(&text, "%d %.17g %.17g %.17g %.17g %d %.17g %d %.17g", (int)s->integrator,
               s->damping_mass, s->damping_stiffness, s->strength, s->relief, (int)s->force,
               frames->interval, frames->count, s->dt * s->steps);
+  ep_hash_add(&text, "path %d %.17g %.17g %.17g", s->methods, s->green.alpha, s->green.sum_to_one,
+              s->green.non_negative);
   hash_loads(&text, s);
   return ep_hash_done(&text);
 }
@@ -108,26 +119,50 @@ static ep_status all_elements(const ep_mesh *mesh, int **out, ep_error *err) {
   return EP_OK;
 }
 
+// Coefficients of the Green-strain path with the quadrature of the elastic term: all elements
+// (weight: volumes), or the elements of `c`.
+static ep_status green_coefficients(ep_bench *bench, const ep_cubature *c,
+                                    ep_green_coefficients *out, ep_error *err) {
+  const ep_bake *bake = &bench->bake;
+  const size_t nt = (size_t)bench->shapes.shape[0].mesh.nt;
+  double *weight = calloc(nt, sizeof *weight), *share = NULL;
+  if (!weight) return ep_fail(err, EP_ERR_MEMORY, "no memory for element weights");
+  if (!c) memcpy(weight, bake->fem.volume, nt * sizeof *weight);
+  for (int i = 0; c && i < c->count; i++) weight[c->tet[i]] += c->weight[i];
+  ep_status status = ep_bake_shares(bake, &share, err);
+  if (status == EP_OK)
+    status = ep_green_coefficients_compute(&bake->fem, &bake->basis, NULL, weight, share,
+                                           bench->log, out, err);
+  free(weight);
+  free(share);
+  return status;
+}
+
 ep_status ep_bench_model(ep_bench *bench, const ep_cubature *c, const double *cubic,
                          ep_precision precision, ep_model_memory *out, ep_error *err) {
   const ep_bake *bake = &bench->bake;
   const ep_mesh *mesh = &bench->shapes.shape[0].mesh;
-  const bool examples = bench->shapes.examples > 0;
+  const bool lb = bench->scene.methods & EP_METHOD_LB,
+             green = bench->scene.methods & EP_METHOD_GREEN;
+  ep_green_coefficients coefficients = {0};
   int *all = NULL;
-  if (!c) EP_TRY(all_elements(mesh, &all, err));
+  if (green) EP_TRY(green_coefficients(bench, cubic ? NULL : c, &coefficients, err));
+  ep_status status = c ? EP_OK : all_elements(mesh, &all, err);
   const ep_model_parts parts = {
       .fem = &bake->fem,
       .basis = &bake->basis,
-      .m = examples ? bench->scene.eigenfunctions : 0,
-      .lb = examples ? &bake->lb[0] : NULL,
-      .lb_mass = examples ? &bake->mass[0] : NULL,
+      .m = lb ? bench->scene.eigenfunctions : 0,
+      .lb = lb ? &bake->lb[0] : NULL,
+      .lb_mass = lb ? &bake->mass[0] : NULL,
       .s = c ? c->count : mesh->nt,
       .tet = c ? c->tet : all,
       .weight = c ? c->weight : bake->fem.volume,
+      .green = green ? &coefficients : NULL,
       .cubic = cubic,
       .precision = precision,
   };
-  const ep_status status = ep_model_build(&parts, out, err);
+  if (status == EP_OK) status = ep_model_build(&parts, out, err);
+  ep_green_coefficients_free(&coefficients);
   free(all);
   return status;
 }

@@ -63,6 +63,16 @@ static void product(const ep_model *model, const double *q, double *u) {
     for (size_t i = 0; i < n3; i++) u[i] += q[a] * model->u[(size_t)a * n3 + i];
 }
 
+// Weights of the examples at frame i, in sets (ep_weight_sets).
+static void take_weights(const ep_record *record, size_t row, int k, double *out) {
+  const size_t count = (size_t)k;
+  if (record->weights) {
+    memcpy(out, record->weights + row * (count + 1) + 1, count * sizeof *out);
+    out += k;
+  }
+  if (record->green_weights) memcpy(out, record->green_weights + row * count, count * sizeof *out);
+}
+
 static void take_frames(const ep_model *model, const ep_record *record, double dt,
                         ep_frames *frames) {
   const size_t stride = (size_t)lround(frames->interval / dt), r = (size_t)model->size.r;
@@ -71,6 +81,7 @@ static void take_frames(const ep_model *model, const ep_record *record, double d
     product(model, record->q + row * r, frames->x + i * frames->n3);
     product(model, record->velocity + row * r, frames->v + i * frames->n3);
     frames->energy[i] = record->energy[row];
+    take_weights(record, row, model->size.k, frames->weight + i * (size_t)frames->nweights);
   }
 }
 
@@ -191,8 +202,7 @@ ep_status ep_compare_reduced(ep_bench *bench, ep_point *point, ep_frames *frames
 
 // ---- errors ------------------------------------------------------------------------------------
 
-// Largest |a - b| over the vertices of frame i, of frames (count x n3).
-static double farthest(size_t n3, const double *a, const double *b) {
+double ep_compare_farthest(size_t n3, const double *a, const double *b) {
   double largest = 0;
   for (size_t v = 0; v < n3; v += 3) {
     double square = 0;
@@ -209,17 +219,21 @@ ep_status ep_compare_errors(const ep_frames *run, const ep_frames *reference, do
                             ep_point *point, ep_error *err) {
   const size_t n3 = run->n3;
   double fastest = 0, greatest = 0;
-  point->position_error = point->velocity_error = point->energy_error = 0;
+  point->position_error = point->velocity_error = point->energy_error = point->weight_error = 0;
   free(point->error_at);
   point->error_at = calloc((size_t)run->count + 1, sizeof *point->error_at);
   if (!point->error_at) return ep_fail(err, EP_ERR_MEMORY, "no memory for errors");
   for (size_t i = 0; i < (size_t)run->count; i++) {
     const double *x = reference->x + i * n3, *v = reference->v + i * n3;
-    point->error_at[i] = farthest(n3, run->x + i * n3, x) / diagonal;
+    point->error_at[i] = ep_compare_farthest(n3, run->x + i * n3, x) / diagonal;
     point->position_error = fmax(point->position_error, point->error_at[i]);
-    point->velocity_error = fmax(point->velocity_error, farthest(n3, run->v + i * n3, v));
+    point->velocity_error =
+        fmax(point->velocity_error, ep_compare_farthest(n3, run->v + i * n3, v));
     point->energy_error = fmax(point->energy_error, fabs(run->energy[i] - reference->energy[i]));
-    fastest = fmax(fastest, farthest(n3, v, NULL));
+    for (size_t j = 0, n = (size_t)run->nweights; j < n; j++)
+      point->weight_error =
+          fmax(point->weight_error, fabs(run->weight[i * n + j] - reference->weight[i * n + j]));
+    fastest = fmax(fastest, ep_compare_farthest(n3, v, NULL));
     greatest = fmax(greatest, fabs(reference->energy[i]));
   }
   point->velocity_error = fastest > 0 ? point->velocity_error / fastest : point->velocity_error;

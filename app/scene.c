@@ -148,17 +148,25 @@ static ep_status read_loads(const ep_scene_reader *r, const raw_scene *raw, ep_s
   return EP_OK;
 }
 
+ep_status ep_read_green(const ep_scene_reader *r, const raw_examples *raw, ep_green *out) {
+  const raw_constraints none = {0};
+  const raw_constraints *weak = raw && raw->constraints ? raw->constraints : &none;
+  EP_TRY(ep_read_number(r, "examples.alpha", raw ? raw->alpha : NULL, 0.5, 0, 1, &out->alpha));
+  EP_TRY(ep_read_number(r, "examples.constraints.sum_to_one", weak->sum_to_one, 0, 0, 1e6,
+                        &out->sum_to_one));
+  return ep_read_number(r, "examples.constraints.non_negative", weak->non_negative, 0, 0, 1e6,
+                        &out->non_negative);
+}
+
+const char *ep_path_name(int methods) {
+  static const char *const names[EP_PATHS + 1] = {"none", "lb", "green", "both"};
+  return names[methods & (EP_METHOD_LB | EP_METHOD_GREEN)];
+}
+
 // A scene may hold the keys of both paths, so that --set examples.path can switch between them.
 static ep_status read_path(const ep_scene_reader *r, const raw_examples *raw, ep_scene *out) {
   out->methods = raw->path ? *raw->path : EP_METHOD_LB;
-  const raw_constraints none = {0}, *weak = raw->constraints ? raw->constraints : &none;
-  const bool green = out->methods & EP_METHOD_GREEN;
-  if (!green) return EP_OK;
-  EP_TRY(ep_read_number(r, "examples.alpha", raw->alpha, 0.5, 0, 1, &out->green.alpha));
-  EP_TRY(ep_read_number(r, "examples.constraints.sum_to_one", weak->sum_to_one, 0, 0, 1e6,
-                        &out->green.sum_to_one));
-  return ep_read_number(r, "examples.constraints.non_negative", weak->non_negative, 0, 0, 1e6,
-                        &out->green.non_negative);
+  return out->methods & EP_METHOD_GREEN ? ep_read_green(r, raw, &out->green) : EP_OK;
 }
 
 // What examples of a region cannot do: both would act on the whole object.
@@ -218,7 +226,7 @@ static ep_status convert(const ep_scene_reader *r, const raw_scene *raw, ep_scen
   EP_TRY(ep_read_contact(r, raw, out));
   EP_TRY(read_examples(r, raw->examples, out));
   EP_TRY(read_output(r, raw->output, out));
-  return ep_read_sweep(r, raw->compare, out);
+  return ep_read_sweep(r, raw, out);
 }
 
 ep_status ep_scene_parse(const char *path, const char *folder, const char *text, size_t size,

@@ -11,7 +11,9 @@
 #include "reduced/eigenpose.h"
 
 // How examples act: shape interpolation in descriptor space, Green-strain potential. Bits.
-enum { EP_METHOD_LB = 1, EP_METHOD_GREEN = 2 };
+enum { EP_METHOD_LB = 1, EP_METHOD_GREEN = 2, EP_PATHS = 3 };
+// "lb", "green", "both"; "none" for 0.
+const char *ep_path_name(int methods);
 typedef enum ep_solver { EP_SOLVER_NLOPT, EP_SOLVER_NEWTON } ep_solver;
 enum { EP_FORMAT_VTU = 1, EP_FORMAT_GLB = 2, EP_FORMAT_PNG = 4 }; // bits of ep_scene.formats
 
@@ -92,8 +94,10 @@ const char *ep_method_name(ep_method method); // "cubature", "cubic", "all", "fu
 enum { EP_LIST_MAX = 16 };
 typedef struct ep_sweep {
   int nmodes, modes[EP_LIST_MAX], nelements, elements[EP_LIST_MAX];
-  int nmethods, nmaterials, nsolvers, ndt, nprecisions;
-  int precision[2]; // ep_precision, of the cubic polynomials
+  int nmethods, nmaterials, nsolvers, ndt, nprecisions, npaths;
+  int path[EP_PATHS]; // EP_METHOD bits
+  ep_green green;     // where a path is green
+  int precision[2];   // ep_precision, of the cubic polynomials
   ep_method method[EP_METHODS];
   ep_material material[EP_MATERIALS];
   char solver[EP_LIST_MAX][48];        // "newton" or NLopt's name of an algorithm

@@ -50,6 +50,8 @@ ep_status ep_read_turn(const ep_scene_reader *r, const char *key, const raw_turn
 ep_status ep_read_motion(const ep_scene_reader *r, const char *key, unsigned count,
                          const raw_keyframe *raw, const bool *smooth, ep_motion_path *out);
 // After everything else of the scene: the defaults come from there.
-ep_status ep_read_sweep(const ep_scene_reader *r, const raw_compare *given, ep_scene *out);
+ep_status ep_read_sweep(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out);
+// alpha and constraints; raw may be NULL.
+ep_status ep_read_green(const ep_scene_reader *r, const raw_examples *raw, ep_green *out);
 
 #endif

@@ -262,6 +262,8 @@ static const cyaml_schema_value_t precision = {
     CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, precision_names, CYAML_ARRAY_LEN(precision_names))};
 static const cyaml_schema_value_t material_name = {
     CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, material_names, CYAML_ARRAY_LEN(material_names))};
+static const cyaml_schema_value_t path = {
+    CYAML_VALUE_ENUM(CYAML_FLAG_STRICT, int, path_names, CYAML_ARRAY_LEN(path_names))};
 static const cyaml_schema_field_t compare_fields[] = {
     CYAML_FIELD_SEQUENCE("modes", OPTIONAL, raw_compare, modes, &number, 1, EP_LIST_MAX),
     CYAML_FIELD_SEQUENCE("elements", OPTIONAL, raw_compare, elements, &number, 1, EP_LIST_MAX),
@@ -269,6 +271,7 @@ static const cyaml_schema_field_t compare_fields[] = {
     CYAML_FIELD_SEQUENCE("materials", OPTIONAL, raw_compare, materials, &material_name, 1,
                          EP_MATERIALS),
     CYAML_FIELD_SEQUENCE("precisions", OPTIONAL, raw_compare, precisions, &precision, 1, 2),
+    CYAML_FIELD_SEQUENCE("paths", OPTIONAL, raw_compare, paths, &path, 1, EP_PATHS),
     CYAML_FIELD_SEQUENCE("solvers", OPTIONAL, raw_compare, solvers, &text, 1, EP_LIST_MAX),
     CYAML_FIELD_SEQUENCE("dt", OPTIONAL, raw_compare, dt, &number, 1, EP_LIST_MAX),
     CYAML_FIELD_ENUM_PTR("reference", OPTIONAL | CYAML_FLAG_STRICT, raw_compare, reference,

@@ -126,8 +126,8 @@ typedef struct raw_output {
 typedef struct raw_compare {
   double *modes, *elements, *dt;
   unsigned modes_count, elements_count, dt_count;
-  int *methods, *materials, *precisions, *reference;
-  unsigned methods_count, materials_count, precisions_count;
+  int *methods, *materials, *precisions, *paths, *reference;
+  unsigned methods_count, materials_count, precisions_count, paths_count;
   char **solvers, *budget;
   unsigned solvers_count;
 } raw_compare;

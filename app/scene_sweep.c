@@ -87,9 +87,26 @@ static ep_status solvers(const ep_scene_reader *r, const raw_compare *raw, const
   return EP_OK;
 }
 
+static ep_status paths(const ep_scene_reader *r, const raw_compare *raw, const ep_scene *scene,
+                       ep_sweep *out) {
+  for (unsigned i = 0; i < (raw->paths_count ? raw->paths_count : 1); i++) {
+    const int path = raw->paths_count ? raw->paths[i] : scene->methods;
+    int at = 0;
+    while (at < out->npaths && out->path[at] != path) at++;
+    if (at < out->npaths) continue;
+    if (ep_scene_local(scene) && (path & EP_METHOD_LB) && !(scene->methods & EP_METHOD_LB))
+      return ep_read_refuse(r, "compare.paths",
+                            "examples with a region are compared on the paths the scene runs; "
+                            "give examples.path: %s",
+                            scene->methods & EP_METHOD_GREEN ? "both" : "lb");
+    out->path[out->npaths++] = path;
+  }
+  return EP_OK;
+}
+
 // Defaults: r and s of the scene and about half and double of them, all methods, its own material.
-ep_status ep_read_sweep(const ep_scene_reader *r, const raw_compare *given, ep_scene *out) {
-  const raw_compare none = {0}, *raw = given ? given : &none;
+ep_status ep_read_sweep(const ep_scene_reader *r, const raw_scene *given, ep_scene *out) {
+  const raw_compare none = {0}, *raw = given->compare ? given->compare : &none;
   ep_sweep *sweep = &out->sweep;
   const int examples = ep_scene_examples(out), low = examples > 4 ? examples : 4;
   const double modes[3] = {fmax(low, out->modes / 2), out->modes, fmin(200, 2 * out->modes)};
@@ -113,6 +130,8 @@ ep_status ep_read_sweep(const ep_scene_reader *r, const raw_compare *given, ep_s
   if (sweep->reference != EP_METHOD_FULL && sweep->reference != EP_METHOD_ALL)
     return ep_read_refuse(r, "compare.reference",
                           "use full (the full space) or all (all elements)");
+  EP_TRY(paths(r, raw, out, sweep));
+  EP_TRY(ep_read_green(r, given->examples, &sweep->green));
   EP_TRY(solvers(r, raw, out, sweep));
   EP_TRY(time_steps(r, raw, out, sweep));
   return budget(r, raw->budget, sweep);

@@ -131,6 +131,11 @@ double *ep_full_velocity(ep_full *full) {
   return full->v;
 }
 
+void ep_full_coordinates(ep_full *full, double *q) {
+  ep_full_to_coordinates(full, full->u);
+  memcpy(q, full->q, (size_t)full->r * sizeof *q);
+}
+
 size_t ep_full_bytes(const ep_full *full) {
   const size_t entries = (size_t)full->k.start[full->n3], matrices = full->k_stvk.n ? 4 : 3;
   const size_t stresses = 6 * (size_t)full->p * (size_t)full->fem->mesh->nt;

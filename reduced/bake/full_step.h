@@ -25,6 +25,8 @@ void ep_full_free(ep_full *full);
 // (3n) displacement and velocity; may be written (zero at held unknowns).
 double *ep_full_displacement(ep_full *full);
 double *ep_full_velocity(ep_full *full);
+// q (r of the examples' model) = U^T M u of the displacement; not without examples.
+void ep_full_coordinates(ep_full *full, double *q);
 // Memory of matrices, factor and vectors [bytes].
 size_t ep_full_bytes(const ep_full *full);
 

@@ -36,8 +36,8 @@ static void errors_are_what_they_say(void **state) {
   (void)state;
   ep_frames reference, run;
   ep_point point = {0};
-  ASSERT_OK(ep_frames_make(3, 0.1, 6, &reference, err));
-  ASSERT_OK(ep_frames_make(3, 0.1, 6, &run, err));
+  ASSERT_OK(ep_frames_make(3, 0.1, 6, 1, &reference, err));
+  ASSERT_OK(ep_frames_make(3, 0.1, 6, 1, &run, err));
   for (int i = 0; i < 18; i++) {
     reference.x[i] = 0.1 * i;
     reference.v[i] = i % 6 < 3 ? 2 : 0; // speed 2 sqrt(3) of the first vertex
