@@ -120,12 +120,24 @@ const char *ep_precision_name(ep_precision precision); // "double", "float"
 // ---- what comes of it --------------------------------------------------------------------------
 // The fastest point below the scene's budgets, or -1; why (256) says how it was chosen.
 int ep_compare_recommend(const ep_comparison *c, char *why);
-// At each dt and solver of the sweep: from which r on cubature (s elements) is faster than the
-// polynomials; NAN where it never is or was not compared. Between two r of the sweep by
-// interpolation of the logarithms.
-double ep_compare_crossover(const ep_comparison *c, int s);
+// From which r on cubature (s elements) is faster than the polynomials of the same precision, the
+// interpolation left out, for one path: at the first time step, material and solver of the sweep.
+typedef struct ep_crossover {
+  int path;
+  ep_precision precision;
+  int compared;                 // numbers of modes where both were run
+  int low, high;                // the smallest and largest of them
+  double low_ratio, high_ratio; // cubature's step over the polynomials' there
+  double r; // between two r by interpolation of the logarithms; low: faster from there on at once;
+            // NAN: not within the sweep
+} ep_crossover;
+enum { EP_CROSSOVERS = 2 * EP_PATHS, EP_CROSSOVER_TEXT = 320 };
+// One for each path and precision that was compared; returns their number.
+int ep_compare_crossovers(const ep_comparison *c, int s, ep_crossover list[EP_CROSSOVERS]);
+// What it says, a sentence without its full stop; text (EP_CROSSOVER_TEXT).
+void ep_compare_crossover_text(const ep_comparison *c, int s, const ep_crossover *x, char *text);
 
-// index.html, chart.svg, chart.png, results.csv, results.json in `folder`.
+// index.html, chart.svg, chart.png, results.csv, frames.csv, results.json in `folder`.
 ep_status ep_compare_write(const char *folder, const ep_comparison *c, ep_error *err);
 json_t *ep_compare_json(const ep_comparison *c);
 void ep_compare_text(FILE *out, const ep_comparison *c);

@@ -3,176 +3,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "app/compare.h"
-#include "results/chart.h"
-
-enum { SERIES_MAX = 64, LABEL = 24 };
-
-// ---- charts ------------------------------------------------------------------------------------
-
-// Points of one method, material, solver and time step make one line of the chart.
-static bool same_line(const ep_point *a, const ep_point *b) {
-  return a->method == b->method && a->material == b->material && a->dt == b->dt &&
-         a->precision == b->precision &&
-         (a->method == EP_METHOD_FULL || strcmp(a->solver, b->solver) == 0) &&
-         (a->method != EP_METHOD_CUBATURE || a->s == b->s);
-}
-
-static void name_line(const ep_comparison *c, const ep_point *p, char *name, size_t size) {
-  const ep_sweep *s = &c->scene->sweep;
-  static const char *const methods[EP_METHODS] = {"cubature", "cubic polynomials", "all elements",
-                                                  "full space"};
-  int n = snprintf(name, size, "%s", methods[p->method]);
-  if (p->method == EP_METHOD_CUBATURE) n += snprintf(name + n, size - (size_t)n, ", s = %d", p->s);
-  if (p->precision == EP_FLOAT) n += snprintf(name + n, size - (size_t)n, ", float");
-  if (s->nmaterials > 1)
-    n += snprintf(name + n, size - (size_t)n, ", %s", ep_material_name(p->material));
-  if (s->ndt > 1) n += snprintf(name + n, size - (size_t)n, ", dt %.3g", p->dt);
-  if (s->nsolvers > 1 && *p->solver && p->method != EP_METHOD_FULL)
-    snprintf(name + n, size - (size_t)n, ", %.24s", p->solver);
-}
-
-typedef struct chart_data {
-  double *x, *y;
-  char (*text)[LABEL];
-  const char **label;
-  char (*name)[96];
-  ep_chart_series list[SERIES_MAX];
-  int series;
-} chart_data;
-
-static void free_data(chart_data *d) {
-  free(d->x);
-  free(d->text);
-  free(d->label);
-  free(d->name);
-}
-
-static ep_status make_data(size_t points, chart_data *d, ep_error *err) {
-  *d = (chart_data){0};
-  d->x = calloc(2 * points + 2, sizeof *d->x);
-  d->text = calloc(points + 1, sizeof *d->text);
-  d->label = calloc(points + 1, sizeof *d->label);
-  d->name = calloc(SERIES_MAX, sizeof *d->name);
-  d->y = d->x ? d->x + points + 1 : NULL;
-  if (d->x && d->text && d->label && d->name) return EP_OK;
-  free_data(d);
-  return ep_fail(err, EP_ERR_MEMORY, "no memory for a chart");
-}
-
-// Error against time of a step: one series a line, ascending r. The reference itself has no error
-// and no place on a logarithmic axis; its time stands in the title.
-static void pareto_series(const ep_comparison *c, chart_data *d) {
-  int used = 0;
-  for (int i = 0; i < c->count && d->series < SERIES_MAX; i++) {
-    bool first = !c->point[i].failed && c->point[i].position_error > 0;
-    for (int j = 0; j < i && first; j++)
-      first = c->point[j].failed || !same_line(&c->point[j], &c->point[i]);
-    if (!first) continue;
-    ep_chart_series *s = &d->list[d->series];
-    *s = (ep_chart_series){.name = d->name[d->series],
-                           .x = d->x + used,
-                           .y = d->y + used,
-                           .label = d->label + used,
-                           .line = true,
-                           .marks = true,
-                           .color = d->series};
-    name_line(c, &c->point[i], d->name[d->series++], sizeof *d->name);
-    for (int j = i; j < c->count; j++) {
-      const ep_point *p = &c->point[j];
-      if (p->failed || !same_line(p, &c->point[i])) continue;
-      d->x[used] = p->step_median_us;
-      d->y[used] = 100 * p->position_error;
-      snprintf(d->text[used], LABEL, "%d", p->r);
-      d->label[used] = d->text[used];
-      s->n++;
-      used++;
-    }
-  }
-}
-
-static ep_chart pareto_chart(const ep_comparison *c, const chart_data *d, char *title,
-                             size_t size) {
-  double full = NAN;
-  for (int i = 0; i < c->count; i++)
-    if (c->point[i].method == EP_METHOD_FULL && !c->point[i].failed)
-      full = c->point[i].step_median_us;
-  int n = snprintf(title, size, "%s: error and run time (numbers: r)", c->name);
-  if (isfinite(full))
-    snprintf(title + n, size - (size_t)n, "; full space %.3g ms a step", 1e-3 * full);
-  return (ep_chart){.title = title,
-                    .x_label = "time of a step [us], median",
-                    .y_label = "position error [% of the diagonal]",
-                    .log_x = true,
-                    .log_y = true,
-                    .width = 900,
-                    .height = 520,
-                    .series = d->series,
-                    .list = d->list};
-}
-
-// Error over time: of each method the point of the scene's own r, or of the most modes.
-static bool shown_over_time(const ep_comparison *c, int i) {
-  const ep_sweep *s = &c->scene->sweep;
-  const ep_point *p = &c->point[i];
-  int r = s->modes[s->nmodes - 1];
-  for (int j = 0; j < s->nmodes; j++)
-    if (s->modes[j] == c->scene->modes) r = s->modes[j];
-  return !p->failed && p->error_at && p->r == r && p->position_error > 0 &&
-         p->dt == s->dt[s->ndt - 1] &&
-         (p->method == EP_METHOD_FULL || strcmp(p->solver, c->point[0].solver) == 0);
-}
-
-static ep_status time_chart(const ep_comparison *c, FILE *out, ep_error *err) {
-  chart_data d;
-  char title[160];
-  const size_t frames = (size_t)c->frames;
-  int r = 0;
-  EP_TRY(make_data(frames * (SERIES_MAX + 1), &d, err));
-  for (size_t i = 0; i < frames; i++) d.x[i] = (double)(i + 1) * c->frame_interval;
-  for (int i = 0; i < c->count && d.series < SERIES_MAX; i++) {
-    if (!shown_over_time(c, i)) continue;
-    double *y = d.y + (size_t)d.series * frames;
-    for (size_t j = 0; j < frames; j++) y[j] = 100 * c->point[i].error_at[j];
-    r = c->point[i].r;
-    name_line(c, &c->point[i], d.name[d.series], sizeof *d.name);
-    d.list[d.series] = (ep_chart_series){.name = d.name[d.series],
-                                         .n = c->frames,
-                                         .x = d.x,
-                                         .y = y,
-                                         .line = true,
-                                         .color = d.series};
-    d.series++;
-  }
-  snprintf(title, sizeof title, "Position error over time at r = %d", r);
-  const ep_chart chart = {.title = title,
-                          .x_label = "time [s]",
-                          .y_label = "position error [% of the diagonal]",
-                          .log_y = true,
-                          .width = 900,
-                          .height = 420,
-                          .series = d.series,
-                          .list = d.list};
-  const ep_status status = d.series > 0 ? ep_chart_svg(&chart, out, err) : EP_OK;
-  free_data(&d);
-  return status;
-}
+#include "app/compare_charts.h"
 
 // ---- tables ------------------------------------------------------------------------------------
 
 static ep_status write_csv(const char *path, const ep_comparison *c, ep_error *err) {
   ep_output out;
   EP_TRY(ep_output_open(&out, path, err));
-  fputs("method,precision,material,r,s,dt,solver,failed", out.file);
+  fputs("method,precision,material,path,r,s,dt,solver,failed", out.file);
 #define X(name, text) fputs("," #name, out.file);
   EP_POINT_NUMBERS(X)
 #undef X
   fputc('\n', out.file);
   for (int i = 0; i < c->count; i++) {
     const ep_point *p = &c->point[i];
-    fprintf(out.file, "%s,%s,%s,%d,%d,%.17g,%s,%d", ep_method_name(p->method),
-            ep_precision_name(p->precision), ep_material_name(p->material), p->r, p->s, p->dt,
-            p->solver, p->failed);
+    fprintf(out.file, "%s,%s,%s,%s,%d,%d,%.17g,%s,%d", ep_method_name(p->method),
+            ep_precision_name(p->precision), ep_material_name(p->material), ep_path_name(p->path),
+            p->r, p->s, p->dt, p->solver, p->failed);
 #define X(name, text) fprintf(out.file, ",%.9g", p->failed ? NAN : p->name);
     EP_POINT_NUMBERS(X)
 #undef X
@@ -189,7 +36,7 @@ static void cell(FILE *out, const char *format, double value) {
 
 static void html_row(FILE *out, const ep_comparison *c, const ep_point *p, bool best) {
   char name[96];
-  name_line(c, p, name, sizeof name);
+  ep_compare_line_name(c, p, name, sizeof name);
   fprintf(out, "<tr%s><th>", best ? " class=\"best\"" : "");
   ep_write_escaped(out, name);
   if (p->method == EP_METHOD_FULL)
@@ -197,7 +44,7 @@ static void html_row(FILE *out, const ep_comparison *c, const ep_point *p, bool 
   else
     fprintf(out, "</th><td>%d</td>", p->r);
   if (p->failed) {
-    fputs("<td colspan=\"12\" class=\"failed\">", out);
+    fputs("<td colspan=\"13\" class=\"failed\">", out);
     ep_write_escaped(out, p->why);
     fputs("</td></tr>\n", out);
     return;
@@ -212,6 +59,7 @@ static void html_row(FILE *out, const ep_comparison *c, const ep_point *p, bool 
   cell(out, "%.2e", p->velocity_error);
   cell(out, "%.2e", p->energy_error);
   cell(out, "%.2e", p->force_error);
+  if (c->examples) cell(out, "%.2e", p->weight_error);
   cell(out, "%.0f", p->inverted);
   cell(out, "%.0f", p->halvings);
   fputs("</tr>\n", out);
@@ -246,12 +94,48 @@ static void html_head(FILE *out, const ep_comparison *c) {
           s->dt[s->ndt - 1]);
 }
 
+// From which r on cubature is faster, for each path and precision of the sweep.
+static void html_crossover(FILE *out, const ep_comparison *c, int s) {
+  ep_crossover list[EP_CROSSOVERS];
+  char text[EP_CROSSOVER_TEXT];
+  const int count = ep_compare_crossovers(c, s, list);
+  for (int i = 0; i < count; i++) {
+    ep_compare_crossover_text(c, s, &list[i], text);
+    fputs("<p>", out);
+    ep_write_escaped(out, text);
+    fputs(".</p>\n", out);
+  }
+}
+
+// Shape difference and time of a step of the paths side by side.
+static void html_paths(FILE *out, const ep_comparison *c) {
+  for (int i = 1; i < c->paths; i++) {
+    double apart = 0;
+    for (int j = 0; j < c->frames; j++) apart = fmax(apart, c->path[i].apart[j]);
+    fprintf(out,
+            "<p>The shapes of path %s are at most %.2f %% of the diagonal from those of %s.</p>\n",
+            ep_path_name(c->path[i].path), 100 * apart, ep_path_name(c->path[0].path));
+  }
+  for (int i = 0; i < c->count && c->paths > 1; i++) {
+    const ep_point *p = &c->point[i];
+    if (p->failed || p->method != EP_METHOD_CUBATURE || p->r != c->scene->modes ||
+        p->s != c->scene->elements || p->dt != c->scene->sweep.dt[0] ||
+        p->material != c->scene->sweep.material[0] ||
+        (*p->solver && strcmp(p->solver, c->scene->sweep.solver[0])))
+      continue;
+    fprintf(out, "<p>Path %s, r = %d, %d elements: %.1f us a step", ep_path_name(p->path), p->r,
+            p->s, p->step_median_us);
+    if (p->path & EP_METHOD_LB) fprintf(out, ", %.1f of it interpolation", p->target_median_us);
+    fputs(".</p>\n", out);
+  }
+}
+
 static void html_advice(FILE *out, const ep_comparison *c) {
   char why[256], name[96];
   const int best = ep_compare_recommend(c, why);
   if (best >= 0) {
     const ep_point *p = &c->point[best];
-    name_line(c, p, name, sizeof name);
+    ep_compare_line_name(c, p, name, sizeof name);
     fputs("<p class=\"pick\"><strong>Recommended: ", out);
     ep_write_escaped(out, name);
     fprintf(out, ", r = %d</strong>: %.3g ms a step, position error %.3g %%. It is ", p->r,
@@ -263,24 +147,9 @@ static void html_advice(FILE *out, const ep_comparison *c) {
     ep_write_escaped(out, why);
     fputs(".</p>\n", out);
   }
-  bool compared = false;
-  for (int i = 0; i < c->count; i++)
-    compared |= c->point[i].method == EP_METHOD_CUBIC && !c->point[i].failed;
-  for (int i = 0; i < c->scene->sweep.nelements && compared; i++) {
-    const int s = c->scene->sweep.elements[i];
-    const double r = ep_compare_crossover(c, s);
-    if (s >= c->tets) continue;
-    if (isfinite(r))
-      fprintf(out,
-              "<p>Cubature with %d elements overtakes the cubic polynomials at r = %.0f (step "
-              "without interpolation).</p>\n",
-              s, r);
-    else
-      fprintf(out,
-              "<p>Cubature with %d elements is slower than the cubic polynomials at every r "
-              "of this sweep.</p>\n",
-              s);
-  }
+  for (int i = 0; i < c->scene->sweep.nelements; i++)
+    html_crossover(out, c, c->scene->sweep.elements[i]);
+  html_paths(out, c);
 }
 
 static void html_table(FILE *out, const ep_comparison *c) {
@@ -289,9 +158,10 @@ static void html_table(FILE *out, const ep_comparison *c) {
   static const char *const heads[] = {
       "method", "r",           "step, median [us]", "min [us]", "interpolation [us]",
       "Newton", "offline [s]", "memory [KiB]",      "position", "velocity",
-      "energy", "force",       "inverted",          "halved"};
+      "energy", "force",       "weights",           "inverted", "halved"};
   fputs("<h2>All settings</h2>\n<div class=\"scroll\"><table><thead><tr>", out);
-  for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) fprintf(out, "<th>%s</th>", heads[i]);
+  for (size_t i = 0; i < sizeof heads / sizeof *heads; i++)
+    if (c->examples || strcmp(heads[i], "weights") != 0) fprintf(out, "<th>%s</th>", heads[i]);
   fputs("</tr></thead><tbody>\n", out);
   for (int i = 0; i < c->count; i++) html_row(out, c, &c->point[i], i == best);
   fputs("</tbody></table></div>\n", out);
@@ -309,24 +179,37 @@ static void html_notes(FILE *out) {
       "box at rest. Velocity: the same over the largest speed of the reference. Energy: largest "
       "difference of elastic and kinetic energy from the reference's, over its largest. Force: "
       "reduced elastic force against the projected force of all elements at configurations of the "
-      "run, root mean square; it holds the quadrature's error alone.</p>\n<p class=\"note\">The "
-      "numbers of the charts are in results.csv; everything, with the errors of every frame, in "
-      "results.json.</p>\n</body></html>\n",
+      "run, root mean square; it holds the quadrature's error alone. Weights: largest difference "
+      "of "
+      "an example's weight from the reference's.</p>\n<p>Every path of the examples has a "
+      "reference of its own: the full space with the forces of that path.</p>\n<p "
+      "class=\"note\">The numbers of the first chart are in results.csv, of those over time in "
+      "frames.csv; everything in results.json.</p>\n</body></html>\n",
       out);
 }
 
-static ep_status write_page(const char *path, const ep_comparison *c, const ep_chart *chart,
-                            ep_error *err) {
+static ep_status html_chart(FILE *out, const char *heading, const ep_chart *chart, ep_error *err) {
+  if (chart->series == 0) return EP_OK;
+  fprintf(out, "<h2>%s</h2>\n", heading);
+  return ep_chart_svg(chart, out, err);
+}
+
+static ep_status html_charts(FILE *out, const ep_compare_charts *charts, ep_error *err) {
+  static const char *const headings[EP_CHARTS] = {"Error and run time", "Error over time",
+                                                  "Weights of the examples",
+                                                  "Difference of the paths"};
+  for (int i = 0; i < EP_CHARTS; i++) EP_TRY(html_chart(out, headings[i], &charts->chart[i], err));
+  return EP_OK;
+}
+
+static ep_status write_page(const char *path, const ep_comparison *c,
+                            const ep_compare_charts *charts, ep_error *err) {
   ep_output out;
   EP_TRY(ep_output_open(&out, path, err));
   html_head(out.file, c);
   html_advice(out.file, c);
-  ep_status status = chart->series > 0 ? ep_chart_svg(chart, out.file, err) : EP_OK;
-  if (status == EP_OK) {
-    html_table(out.file, c);
-    fputs("<h2>Error over time</h2>\n", out.file);
-    status = time_chart(c, out.file, err);
-  }
+  const ep_status status = html_charts(out.file, charts, err);
+  html_table(out.file, c);
   html_notes(out.file);
   if (status == EP_OK) return ep_output_commit(&out, err);
   ep_output_discard(&out);
@@ -347,25 +230,29 @@ static ep_status write_json(const char *path, const ep_comparison *c, ep_error *
   return status;
 }
 
+static ep_status write_files(const char *folder, const ep_comparison *c,
+                             const ep_compare_charts *charts, ep_error *err) {
+  char path[EP_PATH_MAX];
+  EP_TRY(ep_path_join(folder, "index.html", path, err));
+  EP_TRY(write_page(path, c, charts, err));
+  EP_TRY(ep_path_join(folder, "results.csv", path, err));
+  EP_TRY(write_csv(path, c, err));
+  EP_TRY(ep_path_join(folder, "frames.csv", path, err));
+  EP_TRY(ep_compare_write_frames(path, c, charts, err));
+  EP_TRY(ep_path_join(folder, "results.json", path, err));
+  EP_TRY(write_json(path, c, err));
+  if (charts->chart[EP_CHART_PARETO].series == 0) return EP_OK;
+  EP_TRY(ep_path_join(folder, "chart.svg", path, err));
+  EP_TRY(ep_chart_write_svg(path, &charts->chart[EP_CHART_PARETO], err));
+  EP_TRY(ep_path_join(folder, "chart.png", path, err));
+  return ep_chart_write_png(path, &charts->chart[EP_CHART_PARETO], err);
+}
+
 ep_status ep_compare_write(const char *folder, const ep_comparison *c, ep_error *err) {
-  char path[EP_PATH_MAX], title[200];
-  chart_data d;
+  ep_compare_charts charts;
   EP_TRY(ep_make_folders(folder, err));
-  EP_TRY(make_data((size_t)c->count, &d, err));
-  pareto_series(c, &d);
-  const ep_chart chart = pareto_chart(c, &d, title, sizeof title);
-  ep_status status = ep_path_join(folder, "index.html", path, err);
-  if (status == EP_OK) status = write_page(path, c, &chart, err);
-  if (status == EP_OK) status = ep_path_join(folder, "results.csv", path, err);
-  if (status == EP_OK) status = write_csv(path, c, err);
-  if (status == EP_OK) status = ep_path_join(folder, "results.json", path, err);
-  if (status == EP_OK) status = write_json(path, c, err);
-  if (chart.series > 0) {
-    if (status == EP_OK) status = ep_path_join(folder, "chart.svg", path, err);
-    if (status == EP_OK) status = ep_chart_write_svg(path, &chart, err);
-    if (status == EP_OK) status = ep_path_join(folder, "chart.png", path, err);
-    if (status == EP_OK) status = ep_chart_write_png(path, &chart, err);
-  }
-  free_data(&d);
+  EP_TRY(ep_compare_charts_make(c, &charts, err));
+  const ep_status status = write_files(folder, c, &charts, err);
+  ep_compare_charts_free(&charts);
   return status;
 }

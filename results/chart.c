@@ -2,6 +2,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/files.h"
@@ -191,6 +192,11 @@ static double widest_name(const ep_chart *chart) {
   return 48 + 1.1 * widest;
 }
 
+// Eight marks within a colour, so that 64 series are told apart.
+static int mark_of(const ep_chart_series *s) {
+  return (s->color + s->color / COLORS) % COLORS;
+}
+
 static void draw_series(canvas *c, const ep_chart_series *s, const axis *x, const axis *y) {
   const int color = FIRST_SERIES + s->color % COLORS;
   for (int i = 0; i + 1 < s->n && s->line; i++)
@@ -200,9 +206,79 @@ static void draw_series(canvas *c, const ep_chart_series *s, const axis *x, cons
   for (int i = 0; i < s->n; i++) {
     if (!drawable(x, y, s, i)) continue;
     const double px = pixel(x, s->x[i]), py = pixel(y, s->y[i]);
-    if (s->marks) put_mark(c, px, py, s->color % COLORS, color);
-    if (s->label && s->label[i]) put_text(c, px + 8, py - 5, SMALL, 0, color, s->label[i]);
+    if (s->marks) put_mark(c, px, py, mark_of(s), color);
   }
+}
+
+// ---- labels ------------------------------------------------------------------------------------
+
+typedef struct box {
+  double x0, y0, x1, y1;
+  const char *text;
+} box;
+typedef struct placed {
+  box *list;
+  int count;
+} placed;
+
+static bool overlap(const box *a, const box *b) {
+  return a->x0 < b->x1 && b->x0 < a->x1 && a->y0 < b->y1 && b->y0 < a->y1;
+}
+
+// Above right of the mark, then below right, above left, below left.
+static box label_box(double px, double py, int place, const char *text) {
+  const double width = ep_text_width(0.72 * SMALL, text) * 1.1, height = SMALL;
+  const double x0 = place < 2 ? px + 8 : px - 8 - width;
+  const double y1 = place % 2 ? py + 5 + 0.72 * SMALL : py - 4;
+  return (box){x0, y1 - height, x0 + width, y1, text};
+}
+
+// A place for a label where nothing is written or marked yet. Where a series has the same label
+// close by, that one serves both; where all places are taken the label is left out.
+static bool place_label(placed *p, double px, double py, const char *text, box *out) {
+  for (int i = 0; i < p->count; i++) {
+    const box *b = &p->list[i];
+    if (b->text && strcmp(b->text, text) == 0 && fabs(0.5 * (b->x0 + b->x1) - px) < 26 &&
+        fabs(0.5 * (b->y0 + b->y1) - py) < 20)
+      return false;
+  }
+  for (int place = 0; place < 4; place++) {
+    bool is_free = true;
+    *out = label_box(px, py, place, text);
+    for (int i = 0; i < p->count && is_free; i++) is_free = !overlap(out, &p->list[i]);
+    if (is_free) {
+      p->list[p->count++] = *out;
+      return true;
+    }
+  }
+  return false;
+}
+
+static void label_series(canvas *c, const ep_chart_series *s, const axis *x, const axis *y,
+                         placed *p) {
+  for (int i = 0; i < s->n && s->label; i++) {
+    box at;
+    if (!s->label[i] || !drawable(x, y, s, i)) continue;
+    if (place_label(p, pixel(x, s->x[i]), pixel(y, s->y[i]), s->label[i], &at))
+      put_text(c, at.x0, at.y1, SMALL, 0, FIRST_SERIES + s->color % COLORS, s->label[i]);
+  }
+}
+
+// Labels last: they keep clear of all marks and of each other.
+static ep_status draw_labels(canvas *c, const ep_chart *chart, const axis *x, const axis *y) {
+  size_t most = 0;
+  for (int s = 0; s < chart->series; s++) most += 2 * (size_t)chart->list[s].n;
+  placed p = {.list = malloc((most + 1) * sizeof *p.list)};
+  if (!p.list) return ep_fail(c->err, EP_ERR_MEMORY, "no memory for the labels of a chart");
+  for (int s = 0; s < chart->series; s++)
+    for (int i = 0; i < chart->list[s].n && chart->list[s].marks; i++) {
+      const double px = pixel(x, chart->list[s].x[i]), py = pixel(y, chart->list[s].y[i]);
+      if (drawable(x, y, &chart->list[s], i))
+        p.list[p.count++] = (box){px - 4, py - 4, px + 4, py + 4, NULL};
+    }
+  for (int s = 0; s < chart->series; s++) label_series(c, &chart->list[s], x, y, &p);
+  free(p.list);
+  return EP_OK;
 }
 
 static void draw_legend(canvas *c, const ep_chart *chart, double left) {
@@ -211,7 +287,7 @@ static void draw_legend(canvas *c, const ep_chart *chart, double left) {
     const double y = TOP + 10 + LEGEND * s;
     const int color = FIRST_SERIES + series->color % COLORS;
     if (series->line) put_line(c, left, y, left + 22, y, series->marks ? 1 : 2, color);
-    if (series->marks) put_mark(c, left + 11, y, series->color % COLORS, color);
+    if (series->marks) put_mark(c, left + 11, y, mark_of(series), color);
     put_text(c, left + 30, y + 4, TEXT, 0, INK, series->name);
   }
 }
@@ -233,6 +309,7 @@ static ep_status draw(canvas *c, const ep_chart *chart) {
   put_line(c, x.pixel0, y.pixel0, x.pixel1, y.pixel0, 1.4, INK);
   put_line(c, x.pixel0, y.pixel0, x.pixel0, y.pixel1, 1.4, INK);
   for (int s = 0; s < chart->series; s++) draw_series(c, &chart->list[s], &x, &y);
+  EP_TRY(draw_labels(c, chart, &x, &y));
   put_text(c, LEFT, 24, TITLE, 0, INK, chart->title);
   put_text(c, 14, TOP - 14, TEXT, 0, INK, chart->y_label);
   put_text(c, (x.pixel0 + x.pixel1) / 2, chart->height - 10, TEXT, 1, INK, chart->x_label);

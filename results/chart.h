@@ -12,9 +12,9 @@ typedef struct ep_chart_series {
   const char *name;
   int n;
   const double *x, *y;      // (n) points; those a logarithmic axis cannot hold are left out
-  const char *const *label; // (n) beside the marks, or NULL
+  const char *const *label; // (n) beside the marks, or NULL; left out where there is no room
   bool line, marks;
-  int color; // 0..7
+  int color; // 0..63: eight colours, each with eight marks
 } ep_chart_series;
 
 typedef struct ep_chart {

@@ -92,10 +92,24 @@ static void crossover_of_power_laws(void **state) {
   ep_point point[6];
   ep_comparison c;
   make_comparison(&scene, point, &c);
-  assert_float_equal(ep_compare_crossover(&c, 60), 16, 1e-9);
-  assert_true(isnan(ep_compare_crossover(&c, 30))); // not compared
-  point[4].step_median_us = 1e6;                    // slower again at the most modes: no crossover
-  assert_true(isnan(ep_compare_crossover(&c, 60)));
+  ep_crossover x[EP_CROSSOVERS];
+  char text[EP_CROSSOVER_TEXT];
+  assert_int_equal(ep_compare_crossovers(&c, 60, x), 1);
+  assert_float_equal(x[0].r, 16, 1e-9);
+  ep_compare_crossover_text(&c, 60, &x[0], text);
+  assert_non_null(strstr(text, "overtakes the cubic polynomials at r = 16"));
+  assert_int_equal(ep_compare_crossovers(&c, 30, x), 0); // not compared
+  point[4].step_median_us = 16000;                       // slower again at the most modes
+  assert_int_equal(ep_compare_crossovers(&c, 60, x), 1);
+  assert_true(isnan(x[0].r));
+  ep_compare_crossover_text(&c, 60, &x[0], text);
+  assert_non_null(strstr(text, "not overtake"));
+  assert_non_null(strstr(text, "at r = 40 its step takes 2 times"));
+  for (int i = 0; i < 6; i += 2) point[i].step_median_us = 1; // faster everywhere
+  assert_int_equal(ep_compare_crossovers(&c, 60, x), 1);
+  assert_float_equal(x[0].r, 10, 0);
+  ep_compare_crossover_text(&c, 60, &x[0], text);
+  assert_non_null(strstr(text, "the crossover lies below"));
 }
 
 static void budgets_decide(void **state) {
