@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "app/compare.h"
+#include "app/loads.h"
 #include "reduced/bake/full_step.h"
 
 enum { HALVINGS_MAX = 6 };

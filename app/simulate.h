@@ -42,12 +42,4 @@ double ep_median(int count, const double *value);
 // are mass-orthonormal, so this is q . q_ex / |q_ex|^2.
 double ep_example_fraction(const ep_model *model, const double *q, int example);
 
-// Nodal forces of a load at full strength (3n) [N]: gravity by the vertices' lumped masses (mass,
-// n), a push spread over the chosen vertices by theirs. Errors: those of selections.
-ep_status ep_load_forces(const ep_load *load, const ep_mesh *mesh, const double *mass, double *out,
-                         ep_error *err);
-
-// Strength of a push at time t: 0 outside from..until, linear rise and fall over `ramp`.
-double ep_load_profile(const ep_load *load, double t);
-
 #endif

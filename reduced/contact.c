@@ -394,7 +394,7 @@ static void add_change(pass *p, int vertex, const ep_contact_path *path) {
 // told (ep_contact_report.injected).
 static int raise(ep_state *state, const ep_step_def *def, const ep_contact_report *now) {
   ep_contact *c = &state->contact;
-  const double limit = depth_limit(state->model, &def->contact) * (c->touching ? 1.5 : 1);
+  const double limit = depth_limit(state->model, &def->contact) * (c->touching ? 2 : 1);
   if (def->contact.stiffness > 0 || !(now->deepest > limit) || c->raises == RAISES ||
       c->trial_raise >= largest_raise)
     return 0;

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 // clang-format on
 
+#include "app/loads.h"
 #include "app/simulate.h"
 
 static void profile_is_a_trapezoid(void **state) {
