@@ -47,10 +47,10 @@ static void put(writer *w, double x) {
   w->count++;
 }
 
-// One segment of a block (cubic_body.h): pairs (i, j), columns off .. end in vectors.
-static void put_segment(writer *w, int x, int y, int j0, int off, int end) {
+// Vectors v .. end of the columns of one block (cubic_body.h), its pairs (i, j) with j >= j0.
+static void put_segment(writer *w, int x, int y, int j0, int v, int end) {
   const int rows = ep_least(4, w->n - 4 * x);
-  for (; off < end; off += w->lanes) {
+  for (; v < end; v++) {
     for (int i = 0; i < rows; i++) {
       for (int j = j0; j < 4; j++) {
         if (x == y && j > i) continue;
@@ -60,8 +60,8 @@ static void put_segment(writer *w, int x, int y, int j0, int off, int end) {
         }
         const double *from = w->packed + ep_cubic_index(4 * x + i, 4 * y + j, 0, 0);
         const int prefix = ep_triangle(4 * y + j + 1); // c <= b
-        for (int l = 0; l < w->lanes; l++)
-          put(w, off + l < end && off + l < prefix ? from[off + l] : 0);
+        for (int place = v * w->lanes; place < (v + 1) * w->lanes; place++)
+          put(w, place < prefix ? from[place] : 0);
       }
     }
   }
@@ -71,10 +71,9 @@ static void put_blocks(writer *w) {
   const int blocks = (w->n + 3) / 4;
   for (int x = 0; x < blocks; x++)
     for (int step = 0; step <= x; step++) { // the diagonal block first
-      const int y = step ? step - 1 : x;
-      put_segment(w, x, y, 0, 0, ep_triangle(4 * y + 1));
-      for (int j = 1; j < 4; j++)
-        put_segment(w, x, y, j, ep_triangle(4 * y + j), ep_triangle(4 * y + j + 1));
+      const int y = step ? step - 1 : x, full = ep_cubic_full(y, w->lanes);
+      put_segment(w, x, y, 0, 0, full);
+      put_segment(w, x, y, 2, full, ep_cubic_vectors(y, w->lanes));
     }
 }
 
@@ -181,10 +180,9 @@ ep_status ep_cubic_open(int r, ep_precision precision, const void *stream, ep_cu
 
 // The arrays of lay_out in cubic_body.h, and f and k (doubles) in front.
 static size_t reals(int r, int lanes) {
-  const int blocks = (r + 4) / 4, stride = ep_round_up(4 * blocks, lanes);
-  size_t count = (size_t)(stride + lanes) +
-                 2 * (size_t)(ep_round_up(ep_triangle(4 * blocks), lanes) + 2 * lanes) +
-                 (size_t)(4 * blocks) * (size_t)stride;
+  const int blocks = (r + 4) / 4;
+  const size_t stride = (size_t)ep_cubic_stride(r, lanes);
+  size_t count = stride + (size_t)lanes + 2 * (size_t)ep_cubic_pairs(r, lanes) + stride * stride;
   for (int x = 0; x < blocks; x++) count += 4 * (size_t)ep_cubic_row(x, lanes);
   return count;
 }
@@ -200,7 +198,10 @@ size_t ep_cubic_scratch(int r, ep_precision precision) {
 }
 
 size_t ep_cubic_batch_scratch(int r, ep_precision precision) {
-  return reals(r, ep_cubic_lanes(precision)) * ALIGNMENT; // a vector in place of every real
+  const size_t stride = (size_t)ep_round_up(r + 1, 4); // batch_lay_out in cubic_batch_body.h
+  const size_t vectors = stride + (size_t)ep_triangle((int)stride) +
+                         stride * (stride + EP_CUBIC_TILE * (size_t)ep_cubic_lanes(precision));
+  return vectors * ALIGNMENT;
 }
 
 double ep_cubic_evaluate(const ep_cubic *cubic, const double *q, double *f, double *k,

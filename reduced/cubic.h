@@ -32,7 +32,7 @@ size_t ep_cubic_count(int r);
 // Place of w_abcd in the list, a >= b >= c >= d, 0 standing for the constant entry of z.
 size_t ep_cubic_index(int a, int b, int c, int d);
 
-// The list in the order the kernels read it, with padding (about 12 % at r = 50): what a model
+// The list in the order the kernels read it, with padding (6 % at r = 50): what a model
 // holds. Reals of the given precision, 64-byte aligned in use.
 size_t ep_cubic_stream_size(int r, ep_precision precision);
 // packed (ep_cubic_count) to stream. Errors: EP_ERR_ARGUMENT (r outside [1, EP_CUBIC_MAX_MODES]),

@@ -8,7 +8,9 @@
 enum {
   // From this many entries of z on, blocks of the quartic form; below, the plain square matrix over
   // pairs: four times the coefficients, but no padding and no second pass.
-  EP_CUBIC_BLOCKS_FROM = 17
+  EP_CUBIC_BLOCKS_FROM = 17,
+  // Batches: vectors of columns whose T is kept at a time.
+  EP_CUBIC_TILE = 4
 };
 
 struct ep_cubic_task {
@@ -45,10 +47,27 @@ static inline int ep_least(int a, int b) {
   return a < b ? a : b;
 }
 
-// Rows of T, one block of 4 entries x: the triangle of pairs c >= d of entries up to the block's
-// last, and room for a vector reaching over its end.
-static inline int ep_cubic_row(int block, int lanes) {
-  return ep_round_up(ep_triangle(4 * block + 4), lanes) + lanes;
+// Columns of the row blocks (x, y): in the vectors before `full` all pairs (a, b) may have
+// coefficients; from there to the last one only the pairs of the two larger b (c <= b).
+static inline int ep_cubic_full(int y, int lanes) {
+  return (ep_triangle(4 * y + 2) + lanes - 1) / lanes;
+}
+static inline int ep_cubic_vectors(int y, int lanes) {
+  return (ep_triangle(4 * y + 4) + lanes - 1) / lanes;
+}
+
+// Row of T, for a block of 4 entries x: the pairs c >= d up to the block's last entry, and room for
+// a vector reaching over its end.
+static inline int ep_cubic_row(int x, int lanes) {
+  return (ep_cubic_vectors(x, lanes) + 1) * lanes;
+}
+
+// Row of the matrix over entries; pairs of entries, with room as above.
+static inline int ep_cubic_stride(int r, int lanes) {
+  return ep_round_up(r + 1, lanes);
+}
+static inline int ep_cubic_pairs(int r, int lanes) {
+  return ep_cubic_row((r + 4) / 4 - 1, lanes);
 }
 
 #endif
