@@ -27,6 +27,8 @@ void ep_bake_close(ep_bake *bake) {
   free(bake->quality);
   free(bake->paths);
   free(bake->cubic);
+  free(bake->region);
+  free(bake->example_region);
   ep_modes_free(&bake->modes);
   ep_basis_free(&bake->basis);
   ep_cubature_free(&bake->cubature);

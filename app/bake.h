@@ -9,6 +9,7 @@
 #include "lbspace/lbspace.h"
 #include "reduced/bake/basis.h"
 #include "reduced/bake/green_coefficients.h"
+#include "reduced/bake/model_regions.h"
 
 // What an example's pose on the object's mesh is worth.
 typedef struct ep_pose_quality {
@@ -41,6 +42,9 @@ typedef struct ep_bake {
   double *paths; // (examples * samples x 3n)
   ep_basis basis;
   ep_cubature cubature;
+  // local examples, in the sets of shapes; NULL without
+  ep_region_part *region;
+  int *example_region; // (examples)
   ep_green_coefficients green;
   double *cubic; // (ep_cubic_count(modes)) exact coefficients
 } ep_bake;
@@ -65,6 +69,8 @@ ep_status ep_bake_cubature(ep_bake *bake, ep_error *err);
 // Share of each tet in the region of each example (examples x nt), malloc'd; NULL in *out where
 // every example acts everywhere.
 ep_status ep_bake_shares(const ep_bake *bake, double **out, ep_error *err);
+// Fills region and example_region where examples act in regions.
+ep_status ep_bake_regions(ep_bake *bake, ep_error *err);
 ep_status ep_bake_green(ep_bake *bake, ep_error *err);
 ep_status ep_bake_cubic(ep_bake *bake, ep_error *err);
 // The whole bake; path (EP_PATH_MAX) receives the model file in the cache. Stages that were not

@@ -5,6 +5,7 @@
 
 #include "app/bake.h"
 #include "app/model_file.h"
+#include "app/regions.h"
 #include "reduced/bake/model_build.h"
 
 static size_t unknowns(const ep_bake *bake) {
@@ -170,10 +171,50 @@ static bool take_cubature(ep_bake *bake, const ep_bake_step *step) {
     ep_cubature_free(c);
     return false;
   }
+  const size_t numbers = (size_t)bake->shapes->sets * EP_REGION_NUMBERS;
+  if (numbers && !ep_bake_take(step, "regions", numbers, &c->region)) {
+    ep_cubature_free(c);
+    return false;
+  }
+  c->regions = bake->shapes->sets;
   c->count = *count;
   c->train_error = errors[0];
   c->held_out_error = errors[1];
   return true;
+}
+
+// A region integrated worse than this has too few elements for its examples to act as they should.
+static const double region_doubtful = 0.25;
+
+static void warn_of_regions(const ep_bake *bake) {
+  const ep_cubature *c = &bake->cubature;
+  for (int i = 0; i < c->regions; i++) {
+    const double *about = c->region + (size_t)i * EP_REGION_NUMBERS;
+    const int region = bake->shapes->set[i];
+    if (about[EP_REGION_HELD_OUT] > region_doubtful)
+      ep_warn(
+          bake->log,
+          "cubature: the forces of region %s are off by %.2g (held out) with its %.0f elements; "
+          "raise reduction.elements",
+          region < 0 ? "everywhere" : bake->scene->region[region].name, about[EP_REGION_HELD_OUT],
+          about[EP_REGION_ELEMENTS]);
+  }
+}
+
+// *share (sets x nt) is the caller's to free.
+static ep_status regions_of_training(ep_bake *bake, ep_cubature_options *options, double **share,
+                                     ep_error *err) {
+  const ep_mesh *mesh = &bake->shapes->shape[0].mesh;
+  const size_t sets = (size_t)bake->shapes->sets, nt = (size_t)mesh->nt;
+  if (!sets) return EP_OK;
+  EP_TRY(ep_bake_regions(bake, err));
+  *share = malloc(sets * nt * sizeof **share);
+  if (!*share) return ep_fail(err, EP_ERR_MEMORY, "no memory for the examples' regions");
+  for (size_t i = 0; i < sets; i++) ep_region_shares(mesh, bake->region[i].weight, *share + i * nt);
+  options->regions = (int)sets;
+  options->share = *share;
+  options->example_region = bake->example_region;
+  return EP_OK;
 }
 
 static ep_status compute_cubature(ep_bake *bake, ep_bake_step *step, ep_error *err) {
@@ -187,16 +228,22 @@ static ep_status compute_cubature(ep_bake *bake, ep_bake_step *step, ep_error *e
   options.poses = scene->training_poses;
   options.amplitude = scene->amplitude;
   options.seed = scene->seed;
-  EP_TRY(ep_cubature_train(&bake->fem, &bake->basis, &options, bake->log, c, err));
+  double *share = NULL;
+  EP_TRY(regions_of_training(bake, &options, &share, err));
+  const ep_status status = ep_cubature_train(&bake->fem, &bake->basis, &options, bake->log, c, err);
+  free(share);
+  if (status != EP_OK) return status;
+  warn_of_regions(bake);
   const double errors[2] = {c->train_error, c->held_out_error};
   const ep_tensor tensors[] = {
       ep_tensor_of("count", EP_I32, &c->count, 1, 0, 0),
       ep_tensor_of("errors", EP_F64, errors, 2, 0, 0),
       ep_tensor_of("tet", EP_I32, c->tet, c->count, 0, 0),
       ep_tensor_of("weight", EP_F64, c->weight, c->count, 0, 0),
+      ep_tensor_of("regions", EP_F64, c->region, c->regions, EP_REGION_NUMBERS, 0),
   };
-  return ep_cache_store(bake->cache, step->stage->name, &step->stage->key, 4, tensors, 0, NULL,
-                        err);
+  return ep_cache_store(bake->cache, step->stage->name, &step->stage->key, c->regions ? 5 : 4,
+                        tensors, 0, NULL, err);
 }
 
 ep_status ep_bake_cubature(ep_bake *bake, ep_error *err) {
@@ -211,6 +258,22 @@ ep_status ep_bake_cubature(ep_bake *bake, ep_error *err) {
   return failed(status, stage, err);
 }
 
+// ---- regions ---------------------------------------------------------------------------------
+
+ep_status ep_bake_regions(ep_bake *bake, ep_error *err) {
+  const ep_shapes *shapes = bake->shapes;
+  if (bake->region || !shapes->sets) return EP_OK;
+  bake->region = calloc((size_t)shapes->sets, sizeof *bake->region);
+  bake->example_region = calloc((size_t)shapes->examples, sizeof *bake->example_region);
+  if (!bake->region || !bake->example_region)
+    return ep_fail(err, EP_ERR_MEMORY, "no memory for the examples' regions");
+  for (int i = 0; i < shapes->sets; i++)
+    bake->region[i] = (ep_region_part){.weight = ep_shapes_set_weight(shapes, i),
+                                       .m = ep_shapes_set_functions(bake->scene, shapes, i)};
+  for (int i = 0; i < shapes->examples; i++) bake->example_region[i] = shapes->example[i].set;
+  return EP_OK;
+}
+
 // ---- model -----------------------------------------------------------------------------------
 
 static ep_status write_model(ep_bake *bake, const char *path, ep_error *err) {
@@ -219,6 +282,7 @@ static ep_status write_model(ep_bake *bake, const char *path, ep_error *err) {
   EP_TRY(ep_bake_basis(bake, err));
   EP_TRY(ep_bake_green(bake, err));
   EP_TRY(ep_bake_cubic(bake, err));
+  EP_TRY(ep_bake_regions(bake, err));
   if (examples) EP_TRY(ep_bake_lb(bake, 0, err));
   ep_contact_tree tree = {.contacts = 0};
   if (bake->scene->nobstacles)
@@ -226,6 +290,9 @@ static ep_status write_model(ep_bake *bake, const char *path, ep_error *err) {
   const ep_model_parts parts = {
       .fem = &bake->fem,
       .basis = &bake->basis,
+      .regions = bake->shapes->sets,
+      .region = bake->region,
+      .example_region = bake->example_region,
       .m = examples ? bake->scene->eigenfunctions : 0,
       .lb = examples ? &bake->lb[0] : NULL,
       .lb_mass = examples ? &bake->mass[0] : NULL,

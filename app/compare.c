@@ -364,6 +364,12 @@ static ep_status output(const sweep *w, ep_error *err) {
 ep_status ep_command_compare(const ep_cli *cli, ep_error *err) {
   ep_session session;
   EP_TRY(ep_session_open(cli, &session, err));
+  if (session.shapes.sets) {
+    ep_session_close(&session);
+    return ep_fail(err, EP_ERR_UNSUPPORTED,
+                   "compare does not know examples of a region on the LB path yet; leave "
+                   "families[].region out, or use --set examples.path=green");
+  }
   const ep_mesh *mesh = &session.shapes.shape[0].mesh;
   sweep w = {.cli = cli,
              .session = &session,

@@ -252,7 +252,7 @@ static ep_status write_csv(const char *folder, const ep_model *model, const ep_r
       {.name = "t", .components = 1, .data = record->time},
       {.name = "q", .components = model->size.r, .data = record->q, .numbered = true},
       {.name = "w",
-       .components = record->weights ? model->size.k + 1 : 0,
+       .components = record->weights ? model->size.k + ep_model_regions(model) : 0,
        .data = record->weights,
        .numbered = true},
       {.name = "g",

@@ -82,16 +82,20 @@ static bool any_map(const ep_shapes *shapes) {
 
 // ---- LB spaces -------------------------------------------------------------------------------
 
-// Poses need reduction.eigenfunctions, maps those of their family.
-static int most_functions(const ep_scene *scene) {
+// Poses need reduction.eigenfunctions or those of their region, maps those of their family.
+static int most_functions(const planner *p) {
+  const ep_scene *scene = p->scene;
   int most = scene->eigenfunctions;
-  for (int i = 0; i < scene->nfamilies; i++) most = larger(most, scene->family[i].eigenfunctions);
+  for (int i = 0; i < p->shapes->sets; i++)
+    most = larger(most, ep_shapes_set_functions(scene, p->shapes, i));
+  for (int i = 0; i < scene->nfamilies && any_map(p->shapes); i++)
+    most = larger(most, scene->family[i].eigenfunctions);
   return most;
 }
 
 static void plan_eigen(planner *p) {
   const ep_shapes *shapes = p->shapes;
-  const int m = any_map(shapes) ? most_functions(p->scene) : p->scene->eigenfunctions;
+  const int m = most_functions(p);
   if (!shapes->examples) {
     add(p, EP_STAGE_EIGEN, NULL, false, "no examples: no Laplace-Beltrami space is needed");
     return;
@@ -119,7 +123,7 @@ static void plan_eigen(planner *p) {
 }
 
 static ep_status check_functions(const planner *p) {
-  const int m = any_map(p->shapes) ? most_functions(p->scene) : p->scene->eigenfunctions;
+  const int m = most_functions(p);
   for (int i = 0; i < p->plan->count; i++) {
     const ep_stage *stage = &p->plan->stage[i];
     if (stage->kind == EP_STAGE_EIGEN && stage->runs && stage->functions < m)
@@ -210,6 +214,20 @@ static void add_fixed(const planner *p, ep_hash_text *text) {
   ep_hash_add_bytes(text, "fixed", p->shapes->fixed, (size_t)p->shapes->nfixed * sizeof(int));
 }
 
+static void add_set(const planner *p, ep_hash_text *text, int set) {
+  const double *weight = ep_shapes_set_weight(p->shapes, set);
+  ep_hash_add(text, "set %d m=%d", set, ep_shapes_set_functions(p->scene, p->shapes, set));
+  if (weight)
+    ep_hash_add_bytes(text, "region", weight, (size_t)p->shapes->shape[0].mesh.nv * sizeof *weight);
+}
+
+// Which examples act where.
+static void add_sets(const planner *p, ep_hash_text *text) {
+  for (int i = 0; i < p->shapes->sets; i++) add_set(p, text, i);
+  for (int i = 0; p->shapes->sets && i < p->shapes->examples; i++)
+    ep_hash_add(text, "example %d", p->shapes->example[i].set);
+}
+
 static void plan_poses(planner *p) {
   const ep_shapes *shapes = p->shapes;
   if (!shapes->examples) {
@@ -231,6 +249,7 @@ static void plan_poses(planner *p) {
     // A bad map stops the poses where it is not accepted: what was made by accepting it must not
     // be found when it is not.
     ep_hash_add(&text, "accept %d", (int)p->scene->family[e->family].accept);
+    if (shapes->sets) add_set(p, &text, e->set);
     if (e->route == EP_ROUTE_SAME) continue;
     ep_hash_add(&text, "lb %s", ep_plan_eigen(p->plan, 0)->key.hex);
     if (!e->rest_same) ep_hash_add(&text, "rest %s", ep_plan_map(p->plan, 0, e->rest)->key.hex);
@@ -310,6 +329,7 @@ static void plan_cubature(planner *p) {
   add_stage_key(p, &text, EP_STAGE_BASIS);
   ep_hash_add(&text, "s=%d poses=%d amplitude=%.17g seed=%llu", scene->elements,
               scene->training_poses, scene->amplitude, (unsigned long long)scene->seed);
+  add_sets(p, &text);
   stage->key = ep_hash_done(&text);
 }
 
@@ -358,11 +378,26 @@ static void plan_model(planner *p) {
   const bool descriptors = uses_descriptors(p);
   ep_hash_add(&text, "m=%d %s", descriptors ? p->scene->eigenfunctions : 0,
               descriptors ? ep_plan_eigen(p->plan, 0)->key.hex : "none");
+  add_sets(p, &text);
   add_stage_key(p, &text, EP_STAGE_GREEN);
   add_stage_key(p, &text, EP_STAGE_CUBIC);
   if (is_cubic(p)) ep_hash_add(&text, "evaluator %d", (int)p->scene->evaluator);
   if (p->scene->nobstacles) ep_hash_add(&text, "contact");
   stage->key = ep_hash_done(&text);
+}
+
+// "2 examples in 2 sets, each with weights and a target of its own: left, right"
+static void plan_local_target(planner *p, int k) {
+  const ep_shapes *shapes = p->shapes;
+  char list[120] = "";
+  size_t used = 0;
+  for (int i = 0; i < shapes->sets && used + 30 < sizeof list; i++)
+    used +=
+        (size_t)snprintf(list + used, sizeof list - used, "%s%.24s", i ? ", " : "",
+                         shapes->set[i] < 0 ? "everywhere" : p->scene->region[shapes->set[i]].name);
+  add(p, EP_STAGE_TARGET, NULL, true,
+      "%d example%s in %d region%s, each with weights and a target of its own: %s", k,
+      k > 1 ? "s" : "", shapes->sets, shapes->sets > 1 ? "s" : "", list);
 }
 
 static void plan_target(planner *p) {
@@ -374,6 +409,8 @@ static void plan_target(planner *p) {
         "examples.path is green: weights are explicit, nothing is interpolated in a step");
   else if (p->scene->strength == 0)
     add(p, EP_STAGE_TARGET, NULL, false, "examples.strength is 0: examples are only measured");
+  else if (p->shapes->sets)
+    plan_local_target(p, k);
   else
     add(p, EP_STAGE_TARGET, NULL, true, "%d example%s and the rest shape, in every step", k,
         k > 1 ? "s" : "");

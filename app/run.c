@@ -110,8 +110,9 @@ static json_t *make_report(const ep_session *session, const ep_model_file *file,
   json_object_set_new(report, "stages", ep_report_stages(&session->plan));
   add_timing(report, record);
   const int last = record->rows - 1, k = model->size.k;
+  const int shapes = k + ep_model_regions(model);
   json_t *weights = last >= 0 && record->weights
-                        ? ep_json_numbers(k + 1, record->weights + (size_t)last * (size_t)(k + 1))
+                        ? ep_json_numbers(shapes, record->weights + (size_t)last * (size_t)shapes)
                         : json_array();
   json_object_set_new(report, "weights", weights);
   if (record->green_weights && last >= 0) {

@@ -189,8 +189,6 @@ static ep_status read_examples(const ep_scene_reader *r, const raw_examples *giv
   out->solver = raw->solver ? (ep_solver)*raw->solver : EP_SOLVER_NLOPT;
   EP_TRY(read_path(r, raw, out));
   if (ep_scene_local(out) && (out->methods & EP_METHOD_LB)) EP_TRY(check_local(r, out));
-  if (ep_scene_local(out) && (out->methods & EP_METHOD_LB)) // LOCAL-NOT-YET
-    return ep_read_refuse(r, "families", "regions of examples need examples.path: green");
   return ep_read_algorithm(r, "examples.algorithm", raw->algorithm ? raw->algorithm : "LD_LBFGS",
                            out->algorithm);
 }

@@ -93,6 +93,38 @@ static ep_status weigh_regions(const ep_scene *scene, ep_shapes *out, ep_error *
   return EP_OK;
 }
 
+static int set_of(const ep_shapes *shapes, int region) {
+  for (int i = 0; i < shapes->sets; i++)
+    if (shapes->set[i] == region) return i;
+  return -1;
+}
+
+static ep_status divide_examples(const ep_scene *scene, ep_shapes *out, ep_error *err) {
+  if (!ep_scene_local(scene) || !(scene->methods & EP_METHOD_LB)) return EP_OK;
+  out->set = calloc((size_t)scene->nregions + 1, sizeof *out->set);
+  if (!out->set) return ep_fail(err, EP_ERR_MEMORY, "no memory for the examples' regions");
+  for (int region = -1; region < scene->nregions; region++)
+    for (int i = 0; i < scene->nfamilies; i++)
+      if (scene->family[i].region == region && set_of(out, region) < 0)
+        out->set[out->sets++] = region;
+  for (int i = 0; i < out->examples; i++)
+    out->example[i].set = set_of(out, scene->family[out->example[i].family].region);
+  return EP_OK;
+}
+
+const double *ep_shapes_set_weight(const ep_shapes *shapes, int set) {
+  return shapes->set[set] < 0 ? NULL : shapes->region[shapes->set[set]];
+}
+
+int ep_shapes_set_functions(const ep_scene *scene, const ep_shapes *shapes, int set) {
+  return shapes->set[set] < 0 ? scene->eigenfunctions
+                              : scene->region[shapes->set[set]].eigenfunctions;
+}
+
+const double *ep_shapes_local(const ep_shapes *shapes, const ep_pose_source *example) {
+  return shapes->sets ? ep_shapes_set_weight(shapes, example->set) : NULL;
+}
+
 static void mark_lb(const ep_scene *scene, ep_shapes *out) {
   for (int i = 0; i < out->examples; i++) {
     const ep_pose_source *example = &out->example[i];
@@ -125,6 +157,7 @@ ep_status ep_shapes_read(const ep_scene *scene, ep_log *log, ep_shapes *out, ep_
   if (status == EP_OK)
     status = ep_select_fixed(scene, &out->shape[0].mesh, &out->nfixed, &out->fixed, err);
   if (status == EP_OK) status = weigh_regions(scene, out, err);
+  if (status == EP_OK) status = divide_examples(scene, out, err);
   if (status == EP_OK) mark_lb(scene, out);
   if (status != EP_OK) ep_shapes_free(out);
   return status;
@@ -138,6 +171,7 @@ void ep_shapes_free(ep_shapes *shapes) {
   free(shapes->fixed);
   for (int i = 0; shapes->region && i < shapes->regions; i++) free(shapes->region[i]);
   free(shapes->region);
+  free(shapes->set);
   memset(shapes, 0, sizeof *shapes);
 }
 

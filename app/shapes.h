@@ -24,6 +24,7 @@ typedef struct ep_pose_source {
   ep_route route;
   bool rest_same; // rest and object share the connectivity: the map is the identity
   bool pose_same; // pose and rest share the connectivity
+  int set;        // of the examples that act together on the LB path
 } ep_pose_source;
 
 typedef struct ep_shapes {
@@ -35,7 +36,10 @@ typedef struct ep_shapes {
   int nfixed, *fixed;      // ascending vertices of the object
   int regions;
   double **region; // (scene regions) weight of each vertex in [0, 1]; NULL: no family acts there
-  int nmaterials;  // constants to use (scene before mesh file)
+  // Sets of examples of the LB path: those that act everywhere first, then each region with a
+  // family, in order of the scene. 0 where no family has a region: one set, acting everywhere.
+  int sets, *set; // (sets) number of the scene's region, -1: everywhere
+  int nmaterials; // constants to use (scene before mesh file)
   const ep_elastic *material;
   ep_digest physics; // hash of material model, constants and their place
 } ep_shapes;
@@ -45,6 +49,13 @@ typedef struct ep_shapes {
 // scene is borrowed as long as shapes live.
 ep_status ep_shapes_read(const ep_scene *scene, ep_log *log, ep_shapes *out, ep_error *err);
 void ep_shapes_free(ep_shapes *shapes);
+
+// Weights of the vertices in the region of a set (nv of the object); NULL: everywhere.
+const double *ep_shapes_set_weight(const ep_shapes *shapes, int set);
+// LB functions of its descriptor.
+int ep_shapes_set_functions(const ep_scene *scene, const ep_shapes *shapes, int set);
+// The region an example's pose is limited to on the LB path; NULL: none.
+const double *ep_shapes_local(const ep_shapes *shapes, const ep_pose_source *example);
 
 // Density of every tet [kg/m^3] lumped: mass of each vertex [kg], into mass (nv of the object).
 void ep_shapes_vertex_mass(const ep_shapes *shapes, double *mass);

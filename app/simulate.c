@@ -18,7 +18,7 @@ typedef struct simulation {
 static ep_status make_record(const ep_scene *scene, const ep_model *model, ep_record *out,
                              ep_error *err) {
   const size_t rows = (size_t)scene->steps + 1, r = (size_t)model->size.r;
-  const size_t shapes = (size_t)model->size.k + 1;
+  const size_t shapes = (size_t)(model->size.k + ep_model_regions(model));
   memset(out, 0, sizeof *out);
   out->time = calloc(rows, sizeof *out->time);
   out->q = calloc(rows * r, sizeof *out->q);
@@ -65,8 +65,8 @@ static ep_status note(simulation *s, const ep_mesh *mesh, double *x) {
     memcpy(to + EP_CONTACT_FORCE, contact->force, sizeof contact->force);
   }
   if (record->weights) {
-    const ep_status status =
-        note_weights(s, record->weights + row * (size_t)(s->model->size.k + 1));
+    const ep_status status = note_weights(
+        s, record->weights + row * (size_t)(s->model->size.k + ep_model_regions(s->model)));
     if (status != EP_OK) return status;
   }
   if (record->green_weights) {

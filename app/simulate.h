@@ -15,7 +15,7 @@ typedef struct ep_record {
   double *q;             // (rows x r)
   double *velocity;      // (rows x r)
   double *energy;        // (rows) elastic + kinetic, by the model's own quadrature [J]
-  double *weights;       // (rows x (k + 1)), the rest shape's first; NULL without that path
+  double *weights;       // (rows x (regions + k)), the rest shape's first; NULL without that path
   double *green_weights; // (rows x k) of the Green-strain path; NULL without it
   double *contact;       // (rows x EP_CONTACT_COLUMNS); NULL without obstacles
   double *step_ms;       // (rows - 1) wall time of each step, interpolation included

@@ -23,9 +23,10 @@ struct ep_stepper {
   ep_step_def def;
   ep_nlopt_target *nlopt; // NULL: Newton
   timed_solver solver;
-  double *load;          // (nloads x r) generalised force at full strength
-  double *force;         // (r) of the step at hand
-  ep_obstacle *obstacle; // (nobstacles) where they are in the step at hand
+  double *load;            // (nloads x r) generalised force at full strength
+  double *region_strength; // (regions) of a model with regions; NULL
+  double *force;           // (r) of the step at hand
+  ep_obstacle *obstacle;   // (nobstacles) where they are in the step at hand
 };
 
 static ep_status timed_solve(void *user, ep_state *state, const double *w, double *q,
@@ -73,6 +74,15 @@ static ep_status make_obstacles(ep_stepper *s, ep_error *err) {
   return EP_OK;
 }
 
+static ep_status read_strengths(ep_stepper *s, const ep_shapes *shapes, ep_error *err) {
+  if (!s->model->size.regions) return EP_OK;
+  s->region_strength = malloc((size_t)shapes->sets * sizeof *s->region_strength);
+  if (!s->region_strength) return ep_fail(err, EP_ERR_MEMORY, "no memory for the regions");
+  for (int i = 0; i < shapes->sets; i++)
+    s->region_strength[i] = shapes->set[i] < 0 ? 1 : s->scene->region[shapes->set[i]].strength;
+  return EP_OK;
+}
+
 static void set_up_step(ep_stepper *s) {
   const ep_scene *scene = s->scene;
   s->def = ep_default_step();
@@ -83,6 +93,7 @@ static void set_up_step(ep_stepper *s) {
   s->def.relief = scene->relief;
   s->def.strength = s->model->size.k && (scene->methods & EP_METHOD_LB) ? scene->strength : 0;
   s->def.green = scene->green;
+  s->def.region_strength = s->region_strength;
   s->def.example_force = scene->force;
   s->solver.solve = s->nlopt ? ep_nlopt_target_solve : ep_target_newton;
   s->solver.user = s->nlopt;
@@ -103,6 +114,7 @@ static ep_status set_up(ep_stepper *s, const ep_shapes *shapes, ep_error *err) {
   EP_TRY(make_loads(s, shapes, err));
   if (s->model->size.k && s->model->size.m && s->scene->solver == EP_SOLVER_NLOPT)
     EP_TRY(ep_nlopt_target_create(s->state, s->scene->algorithm, 0, &s->nlopt, err));
+  EP_TRY(read_strengths(s, shapes, err));
   set_up_step(s);
   return make_obstacles(s, err);
 }
@@ -125,6 +137,7 @@ void ep_stepper_close(ep_stepper *s) {
   ep_nlopt_target_free(s->nlopt);
   free(s->load);
   free(s->force);
+  free(s->region_strength);
   free(s->obstacle);
   free(s->memory);
   free(s);

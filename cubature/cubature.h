@@ -17,8 +17,15 @@ typedef struct ep_cubature_options {
   int method;            // 0 greedy over all candidates, 1: 100 random candidates a round
   int curve_count;       // held-out error wanted at these sizes too
   const int *curve_size; // (curve_count) ascending
+  // Local examples: share of each element in each region, and the region of each example. 0, NULL:
+  // none. Half as many poses again are then trained and held out, of the material in the regions.
+  int regions;
+  const double *share;       // (regions x nt) in [0, 1]
+  const int *example_region; // (examples)
 } ep_cubature_options;
 ep_cubature_options ep_default_cubature_options(void);
+
+enum { EP_REGION_ELEMENTS, EP_REGION_TRAIN, EP_REGION_HELD_OUT, EP_REGION_NUMBERS };
 
 typedef struct ep_cubature {
   int count;
@@ -26,6 +33,9 @@ typedef struct ep_cubature {
   double *weight;                     // (count) absolute volumes, > 0
   double train_error, held_out_error; // relative force error, root mean square over poses
   double *curve;                      // (curve_count) held-out error at each size
+  int regions;
+  double *region; // (regions x EP_REGION_NUMBERS): elements with a share above 1/2, training error,
+                  // held-out error of the forces of the region alone
 } ep_cubature;
 
 // Training poses: random in the subspace, along the example paths, relative to the examples.

@@ -103,7 +103,7 @@ double ep_element_volume_ratio(const ep_elements *elements, int e, const ep_pose
   return ep_reference_element(f, inverted) > 0 ? det / base_det : 1;
 }
 
-double ep_element_force(const ep_elements *elements, int e, const ep_pose *pose, double *out) {
+static double whole_force(const ep_elements *elements, int e, const ep_pose *pose, double *out) {
   const ep_fem *fem = elements->fem;
   double f[9], stress[9];
   double det = ep_element_gradient(elements, e, pose->q, f);
@@ -125,4 +125,15 @@ double ep_element_force(const ep_elements *elements, int e, const ep_pose *pose,
   for (int i = 0; i < 9; i++) pulled[i] *= weight;
   ep_element_pull_back(elements, e, pulled, out);
   return det / base_det;
+}
+
+double ep_element_force(const ep_elements *elements, int e, const ep_pose *pose, double *out) {
+  const double share = pose->share ? pose->share[e] : 1;
+  if (share == 0) {
+    memset(out, 0, (size_t)elements->r * sizeof *out);
+    return 1;
+  }
+  const double det = whole_force(elements, e, pose, out);
+  for (int a = 0; share != 1 && a < elements->r; a++) out[a] *= share;
+  return det;
 }

@@ -19,6 +19,7 @@ void ep_elements_free(ep_elements *elements);
 typedef struct ep_pose {
   const double *q;         // (r)
   const double *reference; // (r) the undeformed shape; NULL: rest
+  const double *share;     // (nt) share of each element in a region; NULL: all of it
 } ep_pose;
 
 // F_e at q, row-major. Returns det F.
@@ -27,7 +28,7 @@ double ep_element_gradient(const ep_elements *elements, int e, const double *q, 
 // Generalised force of element e per unit of its rest volume (DESIGN "Cubature training"):
 //   rest:      G^T P(F)
 //   reference: v_i G^T P(F F_i^-1) F_i^-T, v_i from ep_reference_element
-// into out (r). Returns det of F or of F F_i^-1; 1 and a zero force where the
+// times its share, into out (r). Returns det of F or of F F_i^-1; 1 and a zero force where the
 // reference shape has no usable element.
 double ep_element_force(const ep_elements *elements, int e, const ep_pose *pose, double *out);
 

@@ -22,6 +22,7 @@ typedef struct pose_maker {
   const ep_elements *elements;
   const ep_basis *basis;
   const double *paths;
+  const ep_cubature_options *options;
   double reach; // largest displacement of random poses [length]
   ep_cholesky k0;
   double *direction, *base, *u, *ratio; // (r), (r), (3 nv), (nt)
@@ -98,13 +99,14 @@ static bool usable(const pose_maker *m, const ep_pose *pose) {
   return crushed <= crushed_share * nt;
 }
 
-// Base and perturbation of the pose; true where it is measured from a reference shape.
-static ep_status draw(pose_maker *m, ep_pose_kind kind, double *reference, ep_error *err) {
+// Base and perturbation of the pose, and the example it belongs to.
+static ep_status draw(pose_maker *m, ep_pose_kind kind, double *reference, size_t *which,
+                      ep_error *err) {
   const size_t r = (size_t)m->elements->r;
   memset(m->base, 0, r * sizeof *m->base);
   if (kind == EP_POSE_RANDOM) return random_direction(m, 1, err);
   const int examples = m->basis->examples;
-  const size_t example = (size_t)ep_random_below(&m->rng, examples);
+  const size_t example = *which = (size_t)ep_random_below(&m->rng, examples);
   if (kind == EP_POSE_PATH) {
     path_point(m, example, ep_random_uniform(&m->rng), m->base);
     return random_direction(m, path_noise, err);
@@ -123,10 +125,10 @@ static ep_status draw(pose_maker *m, ep_pose_kind kind, double *reference, ep_er
 // Shrink the perturbation until the pose is usable; where the base itself is not (an example with
 // crushed elements), shrink that as well.
 static ep_status make_pose(pose_maker *m, ep_pose_kind kind, double *q, double *reference,
-                           int *shrunk, ep_error *err) {
+                           size_t *example, int *shrunk, ep_error *err) {
   const int r = m->elements->r;
-  EP_TRY(draw(m, kind, reference, err));
-  const ep_pose pose = {q, kind == EP_POSE_RELATIVE ? reference : NULL};
+  EP_TRY(draw(m, kind, reference, example, err));
+  const ep_pose pose = {q, kind == EP_POSE_RELATIVE ? reference : NULL, NULL};
   double size = 1, base = 1;
   for (int attempt = 0; attempt < MAX_SHRINKS; attempt++, size *= shrink) {
     if (attempt > MAX_SHRINKS / 2) base *= shrink;
@@ -141,10 +143,11 @@ static ep_status make_pose(pose_maker *m, ep_pose_kind kind, double *q, double *
                  (int)kind);
 }
 
-static ep_pose_kind kind_of(const ep_basis *basis, int i) {
+static ep_pose_kind kind_of(const ep_basis *basis, int i, int count) {
   static const ep_pose_kind pattern[8] = {EP_POSE_RANDOM,   EP_POSE_RELATIVE, EP_POSE_RANDOM,
                                           EP_POSE_PATH,     EP_POSE_RANDOM,   EP_POSE_RELATIVE,
                                           EP_POSE_RELATIVE, EP_POSE_RANDOM};
+  if (i >= count) return EP_POSE_PATH; // of the material in a region
   return basis->examples > 0 ? pattern[i % 8] : EP_POSE_RANDOM;
 }
 
@@ -154,7 +157,8 @@ static ep_status allocate(int count, int r, ep_pose_set *out, ep_error *err) {
   out->q = calloc(numbers, sizeof *out->q);
   out->reference = calloc(numbers, sizeof *out->reference);
   out->kind = calloc((size_t)count + 1, sizeof *out->kind);
-  if (out->q && out->reference && out->kind) return EP_OK;
+  out->region = calloc((size_t)count + 1, sizeof *out->region);
+  if (out->q && out->reference && out->kind && out->region) return EP_OK;
   ep_poses_free(out);
   return ep_fail(err, EP_ERR_MEMORY, "no memory for %d training poses", count);
 }
@@ -179,22 +183,29 @@ static ep_status prepare(pose_maker *m, ep_error *err) {
 }
 
 ep_status ep_poses_make(const ep_elements *elements, const ep_basis *basis, const double *paths,
-                        int count, double amplitude, uint64_t seed, uint64_t stream,
+                        const ep_cubature_options *options, int count, uint64_t stream,
                         ep_pose_set *out, ep_error *err) {
   const size_t r = (size_t)elements->r;
-  pose_maker m = {.elements = elements, .basis = basis, .paths = paths};
-  m.reach = amplitude * ep_mesh_diagonal(elements->fem->mesh);
-  m.rng = ep_random_seed(seed, stream);
+  const int all = options->regions ? count + (count + 1) / 2 : count;
+  pose_maker m = {.elements = elements, .basis = basis, .paths = paths, .options = options};
+  m.reach = options->amplitude * ep_mesh_diagonal(elements->fem->mesh);
+  m.rng = ep_random_seed(options->seed, stream);
   ep_status status = EP_OK;
   *out = (ep_pose_set){0};
   EP_TRY_GOTO(status, prepare(&m, err), done);
-  EP_TRY_GOTO(status, allocate(count, elements->r, out, err), done);
-  for (int i = 0; i < count; i++) {
+  EP_TRY_GOTO(status, allocate(all, elements->r, out, err), done);
+  out->share = options->share;
+  out->nt = elements->nt;
+  for (int i = 0; i < all; i++) {
     const size_t at = (size_t)i * r;
-    out->kind[i] = kind_of(basis, i);
-    EP_TRY_GOTO(status,
-                make_pose(&m, out->kind[i], out->q + at, out->reference + at, &out->shrunk, err),
-                done);
+    size_t example = 0;
+    out->kind[i] = kind_of(basis, i, count);
+    EP_TRY_GOTO(
+        status,
+        make_pose(&m, out->kind[i], out->q + at, out->reference + at, &example, &out->shrunk, err),
+        done);
+    const bool local = options->regions && (i >= count || out->kind[i] == EP_POSE_RELATIVE);
+    out->region[i] = local ? options->example_region[example] : -1;
   }
 done:
   ep_cholesky_free(&m.k0);
@@ -207,11 +218,13 @@ void ep_poses_free(ep_pose_set *poses) {
   free(poses->q);
   free(poses->reference);
   free(poses->kind);
+  free(poses->region);
   *poses = (ep_pose_set){0};
 }
 
 ep_pose ep_pose_at(const ep_pose_set *poses, int i) {
   const size_t at = (size_t)i * (size_t)poses->r;
-  return (ep_pose){poses->q + at,
-                   poses->kind[i] == EP_POSE_RELATIVE ? poses->reference + at : NULL};
+  return (ep_pose){
+      poses->q + at, poses->kind[i] == EP_POSE_RELATIVE ? poses->reference + at : NULL,
+      poses->region[i] < 0 ? NULL : poses->share + (size_t)poses->region[i] * (size_t)poses->nt};
 }

@@ -214,14 +214,25 @@ static void error_range(void *context, int piece, int from, int to) {
 
 ep_status ep_training_error(const ep_training *training, int count, const int *tet,
                             const double *weight, double *error, ep_error *err) {
+  return ep_training_region_error(training, EP_ALL_POSES, count, tet, weight, error, err);
+}
+
+ep_status ep_training_region_error(const ep_training *training, int region, int count,
+                                   const int *tet, const double *weight, double *error,
+                                   ep_error *err) {
   const size_t poses = (size_t)training->poses->count, r = (size_t)training->elements->r;
   double *memory = malloc((poses * (2 * r + 1) + 1) * sizeof *memory);
   if (!memory) return ep_fail(err, EP_ERR_MEMORY, "no memory for the errors of %zu poses", poses);
   error_work w = {training, count, tet, weight, memory, memory + poses * 2 * r};
   ep_parallel_ranges((int)poses, error_range, &w);
   double sum = 0;
-  for (size_t p = 0; p < poses; p++) sum += w.squared[p];
-  *error = poses ? sqrt(sum / (double)poses) : 0;
+  size_t met = 0;
+  for (size_t p = 0; p < poses; p++) {
+    if (region != EP_ALL_POSES && training->poses->region[p] != region) continue;
+    sum += w.squared[p];
+    met++;
+  }
+  *error = met ? sqrt(sum / (double)met) : 0;
   free(memory);
   return EP_OK;
 }

@@ -34,4 +34,10 @@ ep_status ep_training_refit(const ep_training *training, int count, const int *t
 ep_status ep_training_error(const ep_training *training, int count, const int *tet,
                             const double *weight, double *error, ep_error *err);
 
+// The same over the poses of one region (EP_ALL_POSES: all); 0 where there is none.
+enum { EP_ALL_POSES = -2 };
+ep_status ep_training_region_error(const ep_training *training, int region, int count,
+                                   const int *tet, const double *weight, double *error,
+                                   ep_error *err);
+
 #endif

@@ -22,6 +22,7 @@ void ep_cubature_free(ep_cubature *cubature) {
   free(cubature->tet);
   free(cubature->weight);
   free(cubature->curve);
+  free(cubature->region);
   *cubature = (ep_cubature){0};
 }
 
@@ -80,11 +81,10 @@ static ep_status make_poses(trainer *t, const ep_basis *basis, ep_error *err) {
   t->paths = malloc((stations * (size_t)basis->r + 1) * sizeof *t->paths);
   if (!t->paths) return ep_fail(err, EP_ERR_MEMORY, "no memory for the example paths");
   EP_TRY(ep_example_paths(&t->elements, basis, t->paths, err));
-  EP_TRY(ep_poses_make(&t->elements, basis, t->paths, o->poses, o->amplitude, o->seed, STREAM_TRAIN,
-                       &t->poses, err));
+  EP_TRY(ep_poses_make(&t->elements, basis, t->paths, o, o->poses, STREAM_TRAIN, &t->poses, err));
   const int held = (o->poses + 1) / 2;
-  EP_TRY(ep_poses_make(&t->elements, basis, t->paths, held, o->amplitude, o->seed, STREAM_HELD_OUT,
-                       &t->held_poses, err));
+  EP_TRY(
+      ep_poses_make(&t->elements, basis, t->paths, o, held, STREAM_HELD_OUT, &t->held_poses, err));
   EP_TRY(ep_training_make(&t->elements, &t->poses, &t->training, err));
   return ep_training_make(&t->elements, &t->held_poses, &t->held, err);
 }
@@ -181,6 +181,25 @@ static ep_status choose(trainer *t, int size, int *count, ep_error *err) {
   return EP_OK;
 }
 
+// How well each region alone is integrated.
+static ep_status judge_regions(const trainer *t, int count, ep_cubature *out, ep_error *err) {
+  const ep_cubature_options *o = t->options;
+  if (!o->regions) return EP_OK;
+  out->regions = o->regions;
+  out->region = calloc((size_t)o->regions * EP_REGION_NUMBERS, sizeof *out->region);
+  if (!out->region) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d regions", o->regions);
+  for (int g = 0; g < o->regions; g++) {
+    double *about = out->region + (size_t)g * EP_REGION_NUMBERS;
+    const double *share = o->share + (size_t)g * (size_t)t->elements.nt;
+    for (int j = 0; j < count; j++) about[EP_REGION_ELEMENTS] += share[t->tet[j]] > 0.5;
+    EP_TRY(ep_training_region_error(&t->training, g, count, t->tet, t->weight,
+                                    &about[EP_REGION_TRAIN], err));
+    EP_TRY(ep_training_region_error(&t->held, g, count, t->tet, t->weight,
+                                    &about[EP_REGION_HELD_OUT], err));
+  }
+  return EP_OK;
+}
+
 static ep_status keep(const trainer *t, int count, ep_cubature *out, ep_error *err) {
   out->tet = malloc((size_t)count * sizeof *out->tet);
   out->weight = malloc((size_t)count * sizeof *out->weight);
@@ -189,6 +208,7 @@ static ep_status keep(const trainer *t, int count, ep_cubature *out, ep_error *e
   out->count = count;
   memcpy(out->tet, t->tet, (size_t)count * sizeof *out->tet);
   memcpy(out->weight, t->weight, (size_t)count * sizeof *out->weight);
+  EP_TRY(judge_regions(t, count, out, err));
   EP_TRY(ep_training_error(&t->training, count, t->tet, t->weight, &out->train_error, err));
   return ep_training_error(&t->held, count, t->tet, t->weight, &out->held_out_error, err);
 }

@@ -77,7 +77,7 @@ static void test_forces_add_up(void **state) {
     for (size_t i = 0; i < f.b.n3; i++) u[i] += q[a] * f.basis.u[(size_t)a * f.b.n3 + i];
   ASSERT_LESS(0.02, norm_of(f.b.n3, u)); // not the rest shape
   ep_fem_force(&f.b.fem, u, force);
-  sum_forces(&f, &(ep_pose){q, NULL}, sum);
+  sum_forces(&f, &(ep_pose){q, NULL, NULL}, sum);
   double full[R];
   for (int a = 0; a < R; a++) {
     full[a] = 0;
@@ -120,7 +120,7 @@ static double gradient_error(const fixture *f, const double *q, const double *re
     plus[a] = q[a] + h * direction[a];
     minus[a] = q[a] - h * direction[a];
   }
-  sum_forces(f, &(ep_pose){q, reference}, force);
+  sum_forces(f, &(ep_pose){q, reference, NULL}, force);
   for (int a = 0; a < R; a++) slope += force[a] * direction[a];
   const double difference =
       (relative_energy(f, plus, reference) - relative_energy(f, minus, reference)) / (2 * h);
@@ -141,9 +141,9 @@ static void test_relative_forces(void **state) {
     const double fine = gradient_error(&f, q, reference, direction, 0.05);
     assert_float_equal(order_of(coarse, fine), 2, 0.1); // central differences
     ASSERT_LESS(fine, 0.05);
-    sum_forces(&f, &(ep_pose){reference, reference}, force);
+    sum_forces(&f, &(ep_pose){reference, reference, NULL}, force);
     memset(q, 0, sizeof q);
-    sum_forces(&f, &(ep_pose){q, reference}, rest); // at rest the example pulls
+    sum_forces(&f, &(ep_pose){q, reference, NULL}, rest); // at rest the example pulls
     ASSERT_LESS(norm_of(R, force), 1e-10 * norm_of(R, rest));
   }
   free_fixture(&f);
@@ -213,9 +213,14 @@ static void test_poses(void **state) {
   double paths[EXAMPLES * EP_PATH_STATIONS * R], largest = 0, mean = 0;
   ASSERT_OK(ep_example_paths(&f.elements, &f.basis, paths, err));
   ep_pose_set poses, again, held;
-  ASSERT_OK(ep_poses_make(&f.elements, &f.basis, paths, 160, 0.2, 3, 1, &poses, err));
-  ASSERT_OK(ep_poses_make(&f.elements, &f.basis, paths, 160, 0.2, 3, 1, &again, err));
-  ASSERT_OK(ep_poses_make(&f.elements, &f.basis, paths, 160, 0.2, 3, 2, &held, err));
+  ASSERT_OK(ep_poses_make(&f.elements, &f.basis, paths,
+                          &(ep_cubature_options){.amplitude = 0.2, .seed = 3}, 160, 1, &poses,
+                          err));
+  ASSERT_OK(ep_poses_make(&f.elements, &f.basis, paths,
+                          &(ep_cubature_options){.amplitude = 0.2, .seed = 3}, 160, 1, &again,
+                          err));
+  ASSERT_OK(ep_poses_make(&f.elements, &f.basis, paths,
+                          &(ep_cubature_options){.amplitude = 0.2, .seed = 3}, 160, 2, &held, err));
   const double reach = 0.2 * ep_mesh_diagonal(&f.b.mesh);
   int kinds[EP_POSE_KINDS] = {0};
   for (int p = 0; p < poses.count; p++) {
@@ -247,7 +252,8 @@ static void test_shrinks(void **state) {
   fixture f;
   make_fixture(&f, 0, NULL);
   ep_pose_set poses;
-  ASSERT_OK(ep_poses_make(&f.elements, &f.basis, NULL, 20, 50, 3, 1, &poses, err));
+  ASSERT_OK(ep_poses_make(&f.elements, &f.basis, NULL,
+                          &(ep_cubature_options){.amplitude = 50, .seed = 3}, 20, 1, &poses, err));
   assert_in_range(poses.shrunk, 10, 20);
   for (int p = 0; p < poses.count; p++) {
     const ep_pose pose = ep_pose_at(&poses, p);
@@ -269,7 +275,8 @@ static void test_error_measure(void **state) {
   ASSERT_OK(ep_example_paths(&f.elements, &f.basis, paths, err));
   ep_pose_set poses;
   ep_training training;
-  ASSERT_OK(ep_poses_make(&f.elements, &f.basis, paths, 24, 0.2, 3, 1, &poses, err));
+  ASSERT_OK(ep_poses_make(&f.elements, &f.basis, paths,
+                          &(ep_cubature_options){.amplitude = 0.2, .seed = 3}, 24, 1, &poses, err));
   ASSERT_OK(ep_training_make(&f.elements, &poses, &training, err));
   int *tet = malloc((size_t)f.elements.nt * sizeof *tet);
   double *weight = vector_of((size_t)f.elements.nt);
@@ -296,7 +303,9 @@ static void test_sketch(void **state) {
   make_fixture(&f, 0, NULL);
   ep_pose_set poses;
   ep_training training;
-  ASSERT_OK(ep_poses_make(&f.elements, &f.basis, NULL, 150, 0.2, 3, 1, &poses, err));
+  ASSERT_OK(ep_poses_make(&f.elements, &f.basis, NULL,
+                          &(ep_cubature_options){.amplitude = 0.2, .seed = 3}, 150, 1, &poses,
+                          err));
   ASSERT_OK(ep_training_make(&f.elements, &poses, &training, err));
   double error[2];
   for (int sketched = 0; sketched < 2; sketched++) {
