@@ -15,17 +15,21 @@ static ep_status command_bake(const ep_cli *cli, ep_session *session, ep_bake *b
   char path[EP_PATH_MAX];
   EP_TRY(ep_bake_model(bake, path, err));
   EP_TRY(ep_bake_poses(bake, err)); // for the report: a model in the cache does not ask for them
-  if (cli->json)
-    return ep_report_print(json_pack("{s:s, s:s, s:i, s:o, s:o}", "scene", session->scene.name,
-                                     "model", path, "warnings", session->log.warnings, "stages",
-                                     ep_report_stages(&session->plan), "examples",
-                                     ep_poses_json(bake)),
-                           err);
+  if (session->shapes.sets) EP_TRY(ep_bake_cubature(bake, err)); // the same
+  if (cli->json) {
+    json_t *report = json_pack("{s:s, s:s, s:i, s:o, s:o}", "scene", session->scene.name, "model",
+                               path, "warnings", session->log.warnings, "stages",
+                               ep_report_stages(&session->plan), "examples", ep_poses_json(bake));
+    if (report && session->shapes.sets)
+      json_object_set_new(report, "regions", ep_regions_json(bake));
+    return ep_report_print(report, err);
+  }
   for (int i = 0; i < session->plan.count; i++) {
     const ep_stage *stage = &session->plan.stage[i];
     if (stage->runs && ep_stage_is_baked(stage->kind))
       printf("%-30s %8.3f s%s\n", stage->name, stage->seconds, stage->cached ? "  (cached)" : "");
   }
+  ep_regions_text(stdout, bake);
   printf("model: %s\n", path);
   return EP_OK;
 }

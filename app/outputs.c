@@ -302,8 +302,16 @@ static double number(const json_t *object, const char *key) {
 static void text_weights(FILE *out, const json_t *report) {
   const json_t *weights = json_object_get(report, "weights");
   const json_t *green = json_object_get(report, "green_weights");
+  const json_t *regions = json_object_get(report, "regions"); // rest of each, then the examples
+  const size_t sets = json_array_size(regions) ? json_array_size(regions) : 1;
   for (size_t i = 0; i < json_array_size(weights); i++) {
-    fprintf(out, i ? ", example %zu" : "final weights: rest", i);
+    fprintf(out, i ? ", " : "final weights: ");
+    if (i < sets && json_array_size(regions))
+      fprintf(out, "%s at rest", json_string_value(json_array_get(regions, i)));
+    else if (i < sets)
+      fprintf(out, "rest");
+    else
+      fprintf(out, "example %zu", i - sets + 1);
     fprintf(out, " %.3f", json_number_value(json_array_get(weights, i)));
   }
   if (json_array_size(weights)) fprintf(out, "\n");

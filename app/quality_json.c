@@ -195,3 +195,33 @@ void ep_pose_text(FILE *out, const char *name, const ep_pose_quality *q) {
             "coefficients by %.1e\n",
             q->repair_moved, q->repair_moved_most, q->repair_shift);
 }
+
+static const char *region_name(const ep_bake *bake, int set) {
+  const int region = bake->shapes->set[set];
+  return region < 0 ? "everywhere" : bake->scene->region[region].name;
+}
+
+json_t *ep_regions_json(const ep_bake *bake) {
+  json_t *list = json_array();
+  const ep_cubature *c = &bake->cubature;
+  for (int i = 0; list && i < c->regions; i++) {
+    const double *about = c->region + (size_t)i * EP_REGION_NUMBERS;
+    json_array_append_new(list,
+                          json_pack("{s:s, s:i, s:i, s:o, s:o}", "name", region_name(bake, i), "m",
+                                    ep_shapes_set_functions(bake->scene, bake->shapes, i),
+                                    "elements", (int)about[EP_REGION_ELEMENTS], "train_error",
+                                    ep_json_number(about[EP_REGION_TRAIN]), "held_out_error",
+                                    ep_json_number(about[EP_REGION_HELD_OUT])));
+  }
+  return list;
+}
+
+void ep_regions_text(FILE *out, const ep_bake *bake) {
+  const ep_cubature *c = &bake->cubature;
+  for (int i = 0; i < c->regions; i++) {
+    const double *about = c->region + (size_t)i * EP_REGION_NUMBERS;
+    fprintf(out, "region %s: %.0f elements, force error %.3g in training, %.3g held out\n",
+            region_name(bake, i), about[EP_REGION_ELEMENTS], about[EP_REGION_TRAIN],
+            about[EP_REGION_HELD_OUT]);
+  }
+}

@@ -19,6 +19,9 @@ void ep_quality_text(FILE *out, const char *name, const ep_map_quality *quality,
 // {inverted_tets, inverted_before, .., repair_shift}: a pose on the object's mesh.
 json_t *ep_pose_json(const ep_pose_quality *quality);
 // [{name, ..}] of all examples; empty before ep_bake_poses.
+// Regions of local examples: elements and errors of the cubature in each.
+json_t *ep_regions_json(const ep_bake *bake);
+void ep_regions_text(FILE *out, const ep_bake *bake);
 json_t *ep_poses_json(const ep_bake *bake);
 void ep_pose_text(FILE *out, const char *name, const ep_pose_quality *quality);
 

@@ -75,6 +75,17 @@ static json_t *fractions(const ep_model *model, const double *q, double *largest
   return list;
 }
 
+// Of the sets of examples, in the order of their rest shapes among the weights.
+static json_t *region_names(const ep_session *session) {
+  json_t *list = json_array();
+  for (int i = 0; list && i < session->shapes.sets; i++) {
+    const int region = session->shapes.set[i];
+    json_array_append_new(
+        list, json_string(region < 0 ? "everywhere" : session->scene.region[region].name));
+  }
+  return list;
+}
+
 static void add_timing(json_t *report, const ep_record *record) {
   const int steps = record->rows > 0 ? record->rows - 1 : 0;
   json_object_set_new(report, "steps_done", json_integer(steps));
@@ -115,6 +126,7 @@ static json_t *make_report(const ep_session *session, const ep_model_file *file,
                         ? ep_json_numbers(shapes, record->weights + (size_t)last * (size_t)shapes)
                         : json_array();
   json_object_set_new(report, "weights", weights);
+  if (session->shapes.sets) json_object_set_new(report, "regions", region_names(session));
   if (record->green_weights && last >= 0) {
     json_object_set_new(report, "alpha", json_real(scene->green.alpha));
     json_object_set_new(report, "green_weights",

@@ -13,6 +13,7 @@ struct ep_nlopt_target {
   int r, max_evaluations;
   double *factor;           // (r x r) L of K0 = L L^T
   double *y, *q, *g, *best; // (r) scaled unknowns y = L^T q, q, gradient, best q
+  double unit;              // of the scaled unknowns
   double best_energy, best_residual;
   // the solve under way
   ep_state *state;
@@ -21,17 +22,21 @@ struct ep_nlopt_target {
   int evaluations;
 };
 
-// ---- scaling: y = L^T q, dE/dy = L^-1 dE/dq ----------------------------------------------------
+// ---- scaling: y = L^T q / unit, E / unit^2, so that gradients are L^-1 dE/dq / unit ------------
+//
+// NLopt's algorithms stop at gradients below 1e-8 whatever the units: with a small weight they
+// would stop before they began. The unit is a power of two, which changes no digit otherwise.
 
 static void to_scaled(const ep_nlopt_target *t, const double *q, double *y) {
   for (int a = 0; a < t->r; a++) {
     y[a] = 0;
     for (int b = a; b < t->r; b++) y[a] += t->factor[t->r * b + a] * q[b];
+    y[a] /= t->unit;
   }
 }
 
 static void from_scaled(const ep_nlopt_target *t, const double *y, double *q) {
-  memcpy(q, y, (size_t)t->r * sizeof *q);
+  for (int a = 0; a < t->r; a++) q[a] = t->unit * y[a];
   for (int a = t->r - 1; a >= 0; a--) {
     q[a] /= t->factor[t->r * a + a];
     for (int b = 0; b < a; b++) q[b] -= t->factor[t->r * a + b] * q[a];
@@ -44,6 +49,14 @@ static void scale_gradient(const ep_nlopt_target *t, const double *g, double *ou
     for (int b = 0; b < a; b++) sum -= t->factor[t->r * a + b] * out[b];
     out[a] = sum / t->factor[t->r * a + a];
   }
+}
+
+// What gradients are relative to (ep_target_residual), up to a factor of two: |L^-1 g| = 1 for the
+// first column g of L.
+static double unit_of(ep_nlopt_target *t) {
+  for (int a = 0; a < t->r; a++) t->g[a] = t->factor[t->r * a];
+  const double scale = 1 / ep_target_residual(t->state, t->w, t->g);
+  return isfinite(scale) && scale > 0 ? ldexp(1, ilogb(scale)) : 1;
 }
 
 // ---- objective ---------------------------------------------------------------------------------
@@ -59,13 +72,14 @@ static double objective(unsigned n, const double *y, double *gradient, void *use
     return HUGE_VAL;
   }
   if (gradient) scale_gradient(t, t->g, gradient);
+  for (int a = 0; gradient && a < t->r; a++) gradient[a] /= t->unit;
   double residual = ep_target_residual(t->state, t->w, t->g);
   if (energy < t->best_energy || residual <= t->tolerance) {
     t->best_energy = energy, t->best_residual = residual;
     memcpy(t->best, t->q, (size_t)t->r * sizeof *t->best);
   }
   if (residual <= t->tolerance) nlopt_force_stop(t->optimizer);
-  return energy;
+  return energy / (t->unit * t->unit);
 }
 
 // ---- public ------------------------------------------------------------------------------------
@@ -124,6 +138,7 @@ ep_status ep_nlopt_target_solve(void *user, ep_state *state, const double *w, do
   int starts = 0;
   t->state = state, t->w = w, t->tolerance = tolerance, t->evaluations = 0;
   t->best_energy = HUGE_VAL, t->best_residual = HUGE_VAL;
+  t->unit = unit_of(t);
   memcpy(t->best, q, bytes);
   while (t->best_residual > tolerance && starts < MAX_STARTS &&
          t->evaluations < t->max_evaluations) {

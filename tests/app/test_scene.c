@@ -72,8 +72,10 @@ static void green_strain_keys(void **state) {
   refused(HEAD "examples: {path: green, constraints: {non_negative: -1}}\n",
           "s.yaml:3:", "non_negative");
   refused(HEAD "examples: {path: blue}\n", "s.yaml:3:", "path");
-  refused(HEAD "families: [{poses: [box.veg], region: {box: {low: [0, 0, 0], high: [1, 1, 1]}}}]\n",
-          "s.yaml:3:", "examples.path: green");
+#define LOCAL "families: [{poses: [box.veg], region: {box: {low: [0, 0, 0], high: [1, 1, 1]}}}]\n"
+  refused(HEAD LOCAL "examples: {force: linear}\n", "s.yaml:4:", "examples.force");
+  refused(HEAD LOCAL "reduction: {evaluator: cubic}\nexamples: {relief: 0.5}\n",
+          "s.yaml:5:", "examples.relief");
 }
 
 static void everything_is_read(void **state) {
