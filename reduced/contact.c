@@ -3,61 +3,11 @@
 #include <math.h>
 #include <string.h>
 
-#include "reduced/contact_point.h"
+#include "reduced/contact_law.h"
 #include "reduced/state.h"
-
-// Chosen from measurements over drops and impacts (tests/reduced/test_contact.c): a hundred times
-// as stiff as the object over its own diagonal, begun at 0.2 % of it.
-static const double stiffness_ratio = 100, thickness_share = 0.002;
-static const double depth_share = 0.005; // raise the stiffness when deeper than this
-static const double creep_share = 1e-3;  // diagonals per second that count as sticking
-static const double friction_tolerance = 0.02, largest_raise = 1e6;
-enum { FRICTION_PASSES = 4, RAISES = 8 };
-
-static int at_least_zero(double x) {
-  return x >= 0 && isfinite(x);
-}
-
-int ep_contact_def_valid(const ep_step_def *def) {
-  const ep_contact_def *c = &def->contact;
-  if (!at_least_zero(c->stiffness) || !at_least_zero(c->thickness) || !at_least_zero(c->depth) ||
-      !at_least_zero(c->damping) || def->obstacles < 0 || (def->obstacles > 0 && !def->obstacle))
-    return 0;
-  for (int i = 0; i < def->obstacles; i++)
-    if (!ep_obstacle_valid(&def->obstacle[i])) return 0;
-  return 1;
-}
 
 int ep_contact_acts(const ep_state *state, const ep_step_def *def) {
   return state->model->size.contacts > 0 && def->obstacles > 0;
-}
-
-double ep_contact_thickness(const ep_model *model, const ep_contact_def *contact) {
-  return contact->thickness > 0 ? contact->thickness : thickness_share * model->rest_scale;
-}
-
-static double depth_limit(const ep_model *model, const ep_contact_def *contact) {
-  return contact->depth > 0 ? contact->depth : depth_share * model->rest_scale;
-}
-
-// Newmark's average acceleration takes contact fully implicit (Kane, Repetto, Ortiz and Marsden
-// 1999): half of its force would come from the step before, and feed energy in. In the step's
-// potential that is twice the contact's.
-static double share_of(const ep_step_def *def) {
-  return def->integrator == EP_NEWMARK ? 2 : 1;
-}
-
-static ep_contact_law law_of(const ep_state *state, const ep_step_def *def) {
-  const ep_model *model = state->model;
-  const ep_contact_def *contact = &def->contact;
-  ep_contact_law law = {.stiffness = contact->stiffness,
-                        .thickness = ep_contact_thickness(model, contact),
-                        .damping = contact->damping,
-                        .creep = creep_share * model->rest_scale,
-                        .dt = def->dt};
-  if (law.stiffness == 0)
-    law.stiffness = stiffness_ratio * model->contact_scale[0] * state->contact.trial_raise;
-  return law;
 }
 
 // ---- geometry ----------------------------------------------------------------------------------
@@ -231,7 +181,8 @@ static pass make_pass(ep_state *state, const ep_step_def *def, const ep_frame *f
   ep_contact *c = &state->contact;
   return (pass){.state = state,
                 .model = state->model,
-                .law = law_of(state, def),
+                .law = ep_contact_choose(def, state->model->contact_scale[0],
+                                         state->model->rest_scale, &c->memory),
                 .now = pose_of(state->model, q, frame),
                 .start = pose_of(state->model, state->contact_start, frame ? &c->start : NULL),
                 .lag = pose_of(state->model, state->contact_lag, frame ? &c->lag : NULL),
@@ -307,7 +258,7 @@ double ep_contact_energy(ep_state *state, const ep_step_def *def, const ep_frame
   if (!ep_contact_acts(state, def)) return 0;
   pass p = make_pass(state, def, frame, q);
   p.visit = add_energy;
-  p.scale = share_of(def);
+  p.scale = ep_contact_share(def);
   p.g = g, p.h = h, p.n = n;
   over_obstacles(&p, def);
   for (int i = 0; h && i < n; i++)
@@ -333,36 +284,25 @@ void ep_contact_begin(ep_state *state, const ep_step_def *def, const ep_frame *s
   const pose from = pose_of(state->model, q_start, start);
   const pose to = pose_of(state->model, q_ahead, ahead);
   c->way = longest_way(state->model, &from, &to);
-  c->trial_raise = c->raise;
-  c->passes = c->raises = 0;
+  ep_contact_memory_begin(&c->memory);
 }
 
 static void add_report(pass *p, int vertex, const ep_contact_path *path) {
   ep_contact_action act = {0};
-  ep_contact_report *out = p->report;
   if (!ep_contact_point(&p->law, p->obstacle, path, p->model->contact_area[vertex], &act)) return;
   const double *x = path->now, *c = p->now.frame ? p->now.frame->c : (const double[3]){0, 0, 0};
-  const double d[3] = {x[0] - c[0], x[1] - c[1], x[2] - c[2]};
-  const double f[3] = {-act.gradient[0], -act.gradient[1], -act.gradient[2]};
-  out->touching += act.distance < p->law.thickness;
-  out->deepest = fmax(out->deepest, -act.distance);
-  out->energy += act.normal_energy;
-  out->pressing += act.pressing;
-  for (int i = 0; i < 3; i++) {
-    const int j = (i + 1) % 3, k = (i + 2) % 3;
-    out->force[i] += f[i];
-    out->torque[i] += d[j] * f[k] - d[k] * f[j];
-  }
+  const double arm[3] = {x[0] - c[0], x[1] - c[1], x[2] - c[2]};
+  ep_contact_report_add(&p->law, &act, arm, p->report);
 }
 
 static void measure(ep_state *state, const ep_step_def *def, const ep_frame *frame, const double *q,
                     ep_contact_report *report) {
   pass p = make_pass(state, def, frame, q);
+  const ep_contact_memory *m = &state->contact.memory;
   *report = (ep_contact_report){.stiffness = p.law.stiffness,
-                                .raised = state->contact.trial_raise,
-                                .passes = state->contact.passes};
-  const ep_contact *c = &state->contact;
-  if (c->touching > 0) report->injected = c->stored * (c->trial_raise / c->raise - 1);
+                                .raised = m->trial_raise,
+                                .passes = m->passes,
+                                .injected = ep_contact_injected(m)};
   p.visit = add_report;
   p.report = report;
   over_obstacles(&p, def);
@@ -376,32 +316,8 @@ void ep_contact_measure(ep_state *state, const ep_step_def *def, const ep_frame 
 
 // Normal forces at x and where friction took them from.
 static void add_change(pass *p, int vertex, const ep_contact_path *path) {
-  double n[3], y[3], slope[2], unused;
-  if (!path->lag) return;
-  const double *x[2] = {path->now, path->lag};
-  for (int i = 0; i < 2; i++) {
-    ep_obstacle_to_local(&p->obstacle->end, x[i], y);
-    const double d = ep_obstacle_distance(p->obstacle, y, n);
-    ep_contact_penalty(p->law.thickness, p->law.thickness - d, &slope[i], &unused);
-  }
-  const double area = p->model->contact_area[vertex];
-  p->change += area * fabs(slope[0] - slope[1]);
-  p->pressing += area * slope[0];
-}
-
-// Deeper than it may go: a stiffer contact. Where nothing touched at the step's start this brings
-// no energy in (the penalty was zero there); otherwise it is done late, and what it brings in is
-// told (ep_contact_report.injected).
-static int raise(ep_state *state, const ep_step_def *def, const ep_contact_report *now) {
-  ep_contact *c = &state->contact;
-  const double limit = depth_limit(state->model, &def->contact) * (c->touching ? 2 : 1);
-  if (def->contact.stiffness > 0 || !(now->deepest > limit) || c->raises == RAISES ||
-      c->trial_raise >= largest_raise)
-    return 0;
-  c->raises++;
-  c->trial_raise =
-      fmin(largest_raise, c->trial_raise * fmin(16, fmax(2, 1.5 * now->deepest / limit)));
-  return 1;
+  ep_contact_change(&p->law, p->obstacle, path, p->model->contact_area[vertex], &p->change,
+                    &p->pressing);
 }
 
 int ep_contact_again(ep_state *state, const ep_step_def *def, const ep_frame *frame,
@@ -410,23 +326,18 @@ int ep_contact_again(ep_state *state, const ep_step_def *def, const ep_frame *fr
   ep_contact_report now;
   if (!ep_contact_acts(state, def)) return 0;
   measure(state, def, frame, q, &now);
-  int again = raise(state, def, &now);
   pass p = make_pass(state, def, frame, q);
   p.visit = add_change;
   over_obstacles(&p, def);
-  if (p.change > friction_tolerance * p.pressing && c->passes < FRICTION_PASSES) {
-    c->passes++;
-    again = 1;
-  }
-  if (again) keep(state, frame, q, state->contact_lag, &c->lag);
-  return again;
+  if (!ep_contact_retry(def, state->model->rest_scale, now.deepest, p.change, p.pressing,
+                        &c->memory))
+    return 0;
+  keep(state, frame, q, state->contact_lag, &c->lag);
+  return 1;
 }
 
 void ep_contact_commit(ep_state *state, const ep_contact_report *report) {
-  ep_contact *c = &state->contact;
-  c->touching = report->touching;
-  c->stored = report->energy;
-  c->raise = report->touching ? c->trial_raise : 1;
+  ep_contact_memory_commit(report, &state->contact.memory);
 }
 
 int ep_contact_tree_sound(const ep_model *model) {

@@ -11,9 +11,6 @@
 
 #include "reduced/eigenpose.h"
 
-// 1 where the contact numbers of a step are finite and in range, its obstacles too.
-int ep_contact_def_valid(const ep_step_def *def);
-
 // 1 where the model knows its surface and the step has obstacles: all functions below need it.
 int ep_contact_acts(const ep_state *state, const ep_step_def *def);
 
@@ -31,8 +28,8 @@ double ep_contact_energy(ep_state *state, const ep_step_def *def, const ep_frame
                          const double *q, double *g, double *h, int n);
 
 // After a minimum was found at q, frame: 1 where it has to be found once more, because friction has
-// to go by the normal forces found (at most FRICTION_PASSES), or because the object went too deep
-// and the stiffness was raised.
+// to go by the normal forces found (at most EP_FRICTION_PASSES), or because the object went too
+// deep and the stiffness was raised.
 int ep_contact_again(ep_state *state, const ep_step_def *def, const ep_frame *frame,
                      const double *q);
 
@@ -43,9 +40,6 @@ void ep_contact_measure(ep_state *state, const ep_step_def *def, const ep_frame 
 
 // The step is done: the state keeps its stiffness as long as something touches.
 void ep_contact_commit(ep_state *state, const ep_contact_report *report);
-
-// Thickness and stiffness of the step at hand (as given, or chosen).
-double ep_contact_thickness(const ep_model *model, const ep_contact_def *contact);
 
 // Checks the tree of a model that was read: ranges ascending and inside. 1 where sound.
 int ep_contact_tree_sound(const ep_model *model);

@@ -125,3 +125,17 @@ int ep_contact_point(const ep_contact_law *law, const ep_obstacle *obstacle,
     acts |= add_lagged(law, &face, path, area, out);
   return acts;
 }
+
+void ep_contact_change(const ep_contact_law *law, const ep_obstacle *obstacle,
+                       const ep_contact_path *path, double area, double *change, double *pressing) {
+  facing face = {.obstacle = obstacle};
+  double n[3], now, lag, unused;
+  if (!path->lag) return;
+  if (path->fast) face.half_space = entered(obstacle, path, face.normal, &face.offset);
+  ep_contact_penalty(law->thickness, law->thickness - distance_at(&face, path->now, n), &now,
+                     &unused);
+  ep_contact_penalty(law->thickness, law->thickness - distance_at(&face, path->lag, n), &lag,
+                     &unused);
+  *change += law->stiffness * area * fabs(now - lag);
+  *pressing += law->stiffness * area * now;
+}

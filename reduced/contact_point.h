@@ -51,4 +51,9 @@ double ep_contact_penalty(double thickness, double p, double *slope, double *cur
 int ep_contact_point(const ep_contact_law *law, const ep_obstacle *obstacle,
                      const ep_contact_path *path, double area, ep_contact_action *action);
 
+// How friction's normal force at lag differs from that at now: |difference| [N] added to change,
+// that at now to pressing. Nothing without path->lag.
+void ep_contact_change(const ep_contact_law *law, const ep_obstacle *obstacle,
+                       const ep_contact_path *path, double area, double *change, double *pressing);
+
 #endif

@@ -3,6 +3,7 @@
 #ifndef EP_REDUCED_STATE_H
 #define EP_REDUCED_STATE_H
 
+#include "reduced/contact_law.h"
 #include "reduced/eigenpose.h"
 #include "reduced/green.h"
 #include "reduced/kernel.h"
@@ -72,10 +73,7 @@
 typedef struct ep_contact {
   ep_frame start, lag, ahead; // of a free object, beside contact_start, contact_lag, contact_ahead
   double way;                 // longest way of a point in free flight
-  double raise, trial_raise;  // factor on the chosen stiffness: after the last step, in this one
-  double stored;              // energy of the penalty after the last step
-  int touching;               // vertices after the last step
-  int passes, raises;         // of this step
+  ep_contact_memory memory;
 } ep_contact;
 
 struct ep_state {
@@ -92,10 +90,10 @@ struct ep_state {
   double force_scale;  // sum_j w_j (lambda + 2 mu) |G_j|: generalised force at unit strain
   double strain_scale; // max_j |G_j|_F: strain by a unit q
   ep_contact contact;
-  int has_target;      // a target was found before
-  double dt_before;    // of the last step; 0: none, or q or v was written since
-  ep_frame frame;      // free motion: reduced/frame.h; at the end of the last step
-  double linear[3];    // momentum, angular momentum about the centre of mass; world axes
+  int has_target;   // a target was found before
+  double dt_before; // of the last step; 0: none, or q or v was written since
+  ep_frame frame;   // free motion: reduced/frame.h; at the end of the last step
+  double linear[3]; // momentum, angular momentum about the centre of mass; world axes
   double angular[3];
 #define X(name, count) double *name;
   EP_STATE_ARRAYS(X)

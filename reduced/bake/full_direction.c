@@ -29,6 +29,7 @@ static ep_status factorise(ep_full_move *m, int project, ep_error *err) {
   add_strains(m, project);
   ep_axpy(entries, m->inertia + m->rate * m->def->damping_mass, full->mass.value, full->k.value);
   ep_axpy(entries, m->rate * m->def->damping_stiffness, full->k0.value, full->k.value);
+  if (ep_full_touches(m)) ep_full_contact_energy(full->contact, m->def, full->x, NULL, &full->k);
   if (ep_full_pulls(m)) {
     ep_full_to_coordinates(full, full->x);
     ep_example_force_energy(full->examples, m->def, full->q, NULL, full->fh, project);

@@ -18,6 +18,10 @@ double ep_full_alpha(const ep_full_move *m) {
   return m->full->green ? m->def->green.alpha * kept(m) : 0;
 }
 
+int ep_full_touches(const ep_full_move *m) {
+  return m->def->obstacles > 0;
+}
+
 int ep_full_mixed(const ep_full_move *m) {
   return ep_full_alpha(m) > 0 && m->full->k_stvk.n > 0;
 }
@@ -101,6 +105,7 @@ double ep_full_evaluate(ep_full_move *m, const double *x, double *g) {
     sum -= ep_dot(n3, def->force, x);
     if (g) ep_axpy(n3, -1, def->force, g);
   }
+  if (ep_full_touches(m)) sum += ep_full_contact_energy(full->contact, def, x, g, NULL);
   if (g) ep_full_release_held(full, g);
   return sum;
 }

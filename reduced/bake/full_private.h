@@ -4,6 +4,7 @@
 #define EP_BAKE_FULL_PRIVATE_H
 
 #include "linalg/petsc.h"
+#include "reduced/bake/full_contact.h"
 #include "reduced/bake/full_step.h"
 
 // clang-format off
@@ -23,6 +24,7 @@ struct ep_full {
   ep_csr mass, k0, k;
   ep_csr k_stvk; // empty where fem is StVK itself
   ep_factor *factor;
+  ep_full_contact *contact; // made by the first step with obstacles
   double dt_before;
   double force_scale;  // sum_e V (lambda + 2 mu) |gradients|: nodal force at unit strain
   double energy_scale; // sum_e V (lambda + 2 mu): energy at unit strain
@@ -44,6 +46,7 @@ typedef struct ep_full_move {
   double rate, inertia;                     // of the integrator
   double internal;                          // |forces inside| of the last gradient
   double elastic, example, strains, energy; // of the last evaluation
+  int iterations;                           // of Newton, at most
   ep_full_report *report;
 } ep_full_move;
 
@@ -67,6 +70,8 @@ double ep_full_add_quadratic(ep_full *full, const ep_csr *a, double scale, const
                              const double *origin, double *g);
 // The incremental potential at x, gradient g unless NULL.
 double ep_full_evaluate(ep_full_move *m, const double *x, double *g);
+// Obstacles act in this step.
+int ep_full_touches(const ep_full_move *m);
 // |gradient| over the forces in play; never less than what a strain of 1e-8 makes.
 double ep_full_residual(const ep_full_move *m);
 // Newton direction at full->x, where the last evaluation with a gradient was: the exact stiffness

@@ -120,6 +120,7 @@ void ep_full_free(ep_full *full) {
   ep_csr_free(&full->k);
   ep_csr_free(&full->k_stvk);
   ep_factor_free(full->factor);
+  ep_full_contact_free(full->contact);
   free(full->block);
   free(full);
 }
@@ -189,7 +190,7 @@ static ep_status minimise(ep_full_move *m, ep_error *err) {
     m->energy = ep_full_evaluate(m, full->x, full->g);
     m->report->residual = ep_full_residual(m);
     if (m->report->residual <= m->def->tolerance) return EP_OK;
-    if (m->report->newton_iterations == m->def->max_iterations || !isfinite(m->energy) ||
+    if (m->report->newton_iterations == m->iterations || !isfinite(m->energy) ||
         !isfinite(m->report->residual))
       break;
     m->report->newton_iterations++;
@@ -239,6 +240,7 @@ static ep_status predict(ep_full_move *m, ep_error *err) {
                             .dt_before = full->dt_before};
   ep_integrator_predict(m->def->integrator, n3, m->def->dt, &motion, full->base, full->ahead,
                         &m->rate, &m->inertia);
+  if (ep_full_touches(m)) ep_full_contact_begin(full->contact, full->u, full->ahead);
   const double still = ep_full_evaluate(m, full->u, NULL),
                flight = ep_full_evaluate(m, full->ahead, NULL);
   memcpy(full->x, flight < still ? full->ahead : full->u, n3 * sizeof *full->x);
@@ -254,6 +256,38 @@ static ep_status interpolate(ep_full_move *m, ep_error *err) {
   ep_status status = ep_interpolate(full->examples, m->def, &m->report->target);
   if (status == EP_OK) return EP_OK;
   return ep_fail(err, status, "full-space step: the interpolation of the examples failed");
+}
+
+// Minimise; again where friction or the depth ask for it.
+static ep_status minimise_all(ep_full_move *m, ep_error *err) {
+  m->iterations = m->def->max_iterations;
+  for (;;) {
+    EP_TRY(minimise(m, err));
+    if (!ep_full_touches(m) || !ep_full_contact_again(m->full->contact, m->def, m->full->x))
+      return EP_OK;
+    m->iterations = m->report->newton_iterations + m->def->max_iterations;
+  }
+}
+
+// The acceleration Newmark's formula goes on with is free of contact.
+static ep_status take_contact_off(ep_full_move *m, ep_error *err) {
+  ep_full *full = m->full;
+  const size_t n3 = (size_t)full->n3;
+  memset(full->g, 0, n3 * sizeof *full->g);
+  ep_full_contact_energy(full->contact, m->def, full->x, full->g, NULL);
+  ep_full_release_held(full, full->g);
+  EP_TRY(ep_factor_update(full->factor, &full->mass, err));
+  EP_TRY(ep_factor_solve(full->factor, 1, full->g, full->trial, err));
+  ep_axpy(n3, 1, full->trial, full->a);
+  return EP_OK;
+}
+
+static ep_status finish_contact(ep_full_move *m, ep_error *err) {
+  ep_full_contact *contact = m->full->contact;
+  if (!ep_full_touches(m)) return EP_OK;
+  ep_full_contact_measure(contact, m->def, m->full->x, &m->report->contact);
+  ep_contact_memory_commit(&m->report->contact, &contact->memory);
+  return m->def->integrator == EP_NEWMARK ? take_contact_off(m, err) : EP_OK;
 }
 
 static void finish(ep_full_move *m) {
@@ -287,8 +321,10 @@ ep_status ep_full_step(ep_full *full, const ep_step_def *def, ep_full_report *re
   if (full->green) full->green->weak = def->green;
   ep_full_move m = {.full = full, .def = def, .report = report};
   if (ep_full_pulls(&m)) EP_TRY(interpolate(&m, err));
+  if (ep_full_touches(&m) && !full->contact)
+    EP_TRY(ep_full_contact_create(full->fem, &full->contact, err));
   EP_TRY(predict(&m, err));
-  EP_TRY(minimise(&m, err));
+  EP_TRY(minimise_all(&m, err));
   finish(&m);
-  return EP_OK;
+  return finish_contact(&m, err);
 }

@@ -34,6 +34,7 @@ typedef struct ep_full_report {
   int newton_iterations, line_search_steps, projections, solves;
   double residual; // |gradient| over the forces in play
   ep_target_report target;
+  ep_contact_report contact;                             // torque about the origin
   double elastic_energy, example_energy, kinetic_energy; // at the end of the step
   double green_energy;                                   // as in ep_step_report
 } ep_full_report;
