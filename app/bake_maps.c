@@ -5,6 +5,7 @@
 
 #include "app/bake.h"
 #include "app/landmarks.h"
+#include "app/map_fields.h"
 #include "app/map_store.h"
 
 // ---- LB spaces -------------------------------------------------------------------------------
@@ -101,6 +102,12 @@ static ep_status compute_map(ep_bake *bake, ep_bake_step *step, ep_map *map, ep_
                              landmark, &options.landmarks, err));
   EP_TRY(ep_bake_lb(bake, stage->from, err));
   EP_TRY(ep_bake_lb(bake, stage->to, err));
+  EP_TRY(ep_map_fields(bake->scene, bake->shapes, stage->family, stage->from, stage->to, &regions,
+                       err));
+  if (regions.count) {
+    options.regions = &regions;
+    options.to_column = 1; // from_column: 0
+  }
   if (family->regions) {
     EP_TRY(read_regions(bake, stage->family, &regions, err));
     options.regions = &regions;

@@ -117,13 +117,14 @@ static ep_status judge(const ep_bake *bake, const ep_stage *stage, const ep_map 
 static void warn_of_suspects(const ep_bake *bake, const ep_stage *stage, const ep_map_quality *q) {
   char list[240] = "";
   size_t used = 0;
+  const char *file = bake->scene->family[stage->family].regions;
   for (int i = 0; q->region && i < q->regions && used + 40 < sizeof list; i++)
     if (q->region[i].suspect)
       used += (size_t)snprintf(list + used, sizeof list - used, "%s%d (fits %d)", used ? ", " : "",
                                i + 1, q->region[i].best_match + 1);
   if (used)
     ep_warn(bake->log, "%s: regions that do not belong together, left out: %s; check %s",
-            stage->name, list, bake->scene->family[stage->family].regions);
+            stage->name, list, file ? file : "map.fields");
 }
 
 static ep_status get_map(ep_bake *bake, int from, int to, const ep_map **out, ep_error *err) {

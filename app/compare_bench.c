@@ -91,6 +91,7 @@ static void hash_loads(ep_hash_text *text, const ep_scene *scene) {
     ep_hash_add(text, "load %d %.17g %.17g %.17g %.17g %.17g %.17g %d %s", l->gravity, l->vector[0],
                 l->vector[1], l->vector[2], l->from, l->until, l->ramp, (int)l->where.kind,
                 l->where.path ? l->where.path : "");
+    ep_hash_add(text, "value %.17g %d", l->where.value, l->where.equals);
     ep_hash_add_bytes(text, "where", l->where.a, sizeof l->where.a);
     ep_hash_add_bytes(text, "where", l->where.b, sizeof l->where.b);
   }

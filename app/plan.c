@@ -7,6 +7,7 @@
 
 #include "app/hash_text.h"
 #include "app/landmarks.h"
+#include "app/map_fields.h"
 
 // Raised whenever a stage computes something else from the same input: old results are then not
 // found any more.
@@ -149,23 +150,42 @@ static ep_status add_landmarks(const planner *p, int family, int from, int to, e
   return EP_OK;
 }
 
-static const char *how(const ep_family *f) {
+static const char *how(const ep_family *f, int by_fields) {
   if (f->regions && f->landmarks) return "by the given regions and landmarks";
   if (f->regions) return "by the given regions";
+  if (by_fields && f->landmarks) return "by fields of the meshes and the given landmarks";
+  if (by_fields) return "by fields of the meshes";
   return f->landmarks ? "by the given landmarks" : "automatic";
+}
+
+// The regions the meshes mark themselves, into the key of their map.
+static ep_status add_fields(const planner *p, int family, int from, int to, ep_hash_text *text,
+                            int *count) {
+  ep_regions regions;
+  EP_TRY(ep_map_fields(p->scene, p->shapes, family, from, to, &regions, p->err));
+  *count = regions.count;
+  if (regions.count) {
+    const size_t lists = 2 * (size_t)regions.count, vertices = (size_t)regions.start[lists];
+    ep_hash_add_bytes(text, "fields", regions.start, (lists + 1) * sizeof *regions.start);
+    ep_hash_add_bytes(text, "fields", regions.vertex, vertices * sizeof *regions.vertex);
+  }
+  ep_map_fields_free(&regions);
+  return EP_OK;
 }
 
 static ep_status plan_map(planner *p, int family, int from, int to, const char *why) {
   if (ep_plan_map(p->plan, from, to)) return EP_OK;
   const ep_family *f = &p->scene->family[family];
   const ep_shape_file *target = &p->shapes->shape[to], *source = &p->shapes->shape[from];
-  ep_stage *stage = add(p, EP_STAGE_MAP, target->name, true, "%s, %s", why, how(f));
+  int by_fields = 0;
+  ep_hash_text text = key_of(EP_STAGE_MAP);
+  EP_TRY(add_fields(p, family, from, to, &text, &by_fields));
+  ep_stage *stage = add(p, EP_STAGE_MAP, target->name, true, "%s, %s", why, how(f, by_fields));
   stage->from = from;
   stage->to = to;
   stage->family = family;
   stage->same_family = to != p->shapes->rest[family];
   stage->functions = f->eigenfunctions;
-  ep_hash_text text = key_of(stage->kind);
   ep_hash_add(&text, "%s %s m=%d same=%d frame=%d reflections=%d", source->geometry.hex,
               target->geometry.hex, stage->functions, (int)stage->same_family, (int)f->frame,
               (int)f->reflections);

@@ -112,7 +112,7 @@ static ep_status spread(const ep_mesh *mesh, const unsigned char *chosen, double
 
 static ep_status distances(const ep_scene_region *region, const ep_mesh *mesh,
                            const unsigned char *chosen, double *out, ep_error *err) {
-  if (region->where.kind == EP_SELECT_FILE) return spread(mesh, chosen, region->soft, out, err);
+  if (region->where.path) return spread(mesh, chosen, region->soft, out, err);
   for (int v = 0; v < mesh->nv; v++)
     out[v] = ep_select_distance(&region->where, mesh->x + 3 * (size_t)v);
   return EP_OK;

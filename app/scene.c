@@ -39,8 +39,7 @@ static ep_status read_fixed(const ep_scene_reader *r, const raw_scene *raw, ep_s
     char key[64];
     snprintf(key, sizeof key, "fixed.%u", i);
     out->nfixed++;
-    EP_TRY(ep_read_selection(r, key, raw->fixed[i].box, raw->fixed[i].plane, raw->fixed[i].file,
-                             &out->fixed[i]));
+    EP_TRY(ep_read_selection(r, key, &raw->fixed[i], &out->fixed[i]));
   }
   return EP_OK;
 }
@@ -107,7 +106,9 @@ static ep_status read_simulation(const ep_scene_reader *r, const raw_simulation 
 static ep_status read_push(const ep_scene_reader *r, const char *key, const raw_push *raw,
                            ep_load *out) {
   char part[96];
-  EP_TRY(ep_read_selection(r, key, raw->box, raw->plane, raw->file, &out->where));
+  const raw_selection where = {raw->box,   raw->plane, raw->file,
+                               raw->field, raw->above, raw->equals};
+  EP_TRY(ep_read_selection(r, key, &where, &out->where));
   snprintf(part, sizeof part, "%s.force", key);
   EP_TRY(ep_read_vector(r, part, raw->force, out->vector));
   snprintf(part, sizeof part, "%s.from", key);
@@ -269,6 +270,12 @@ void ep_scene_free(ep_scene *scene) {
     free(family->regions);
     for (int j = 0; j < family->landmarks; j++) free(family->landmark[j].pose);
     free(family->landmark);
+    for (int j = 0; j < family->fields; j++) {
+      free(family->field[j].object);
+      free(family->field[j].rest);
+      free(family->field[j].poses);
+    }
+    free(family->field);
   }
   for (int i = 0; i < scene->nregions; i++) {
     free(scene->region[i].name);

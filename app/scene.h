@@ -17,13 +17,21 @@ const char *ep_path_name(int methods);
 typedef enum ep_solver { EP_SOLVER_NLOPT, EP_SOLVER_NEWTON } ep_solver;
 enum { EP_FORMAT_VTU = 1, EP_FORMAT_GLB = 2, EP_FORMAT_PNG = 4 }; // bits of ep_scene.formats
 
-typedef enum ep_select { EP_SELECT_BOX, EP_SELECT_PLANE, EP_SELECT_FILE } ep_select;
-// Which vertices: inside a closed box, behind or on a plane, or listed in a file.
+typedef enum ep_select {
+  EP_SELECT_BOX,
+  EP_SELECT_PLANE,
+  EP_SELECT_FILE,
+  EP_SELECT_FIELD
+} ep_select;
+// Which vertices: inside a closed box, behind or on a plane, listed in a file, or by an array of
+// the mesh file on its vertices.
 typedef struct ep_selection {
   ep_select kind;
   double a[3], b[3]; // box: low, high; plane: point, normal
-  char *path;        // file
-  char key[64];      // where it stands in the scene, for messages
+  char *path;        // file; name of the array
+  double value;      // of the array: chosen above it, or where it is that
+  bool equals;
+  char key[64]; // where it stands in the scene, for messages
 } ep_selection;
 
 // A part of the object where examples act: weight 1 on `where`, falling smoothly to 0 over the
@@ -50,12 +58,20 @@ typedef struct ep_scene_landmark {
   ep_mark *pose; // (poses)
 } ep_scene_landmark;
 
+// An array on the vertices that marks corresponding parts of the shapes of a family: its name in
+// the file of each. poses NULL: used between the rest shape and the poses that carry rest's name.
+typedef struct ep_map_field {
+  char *object, *rest, *poses;
+} ep_map_field;
+
 typedef struct ep_family {
   char *name;
   char *rest; // NULL: poses are of the object's own rest shape
   int poses;
   char **pose;   // (poses)
-  char *regions; // NULL: automatic map
+  char *regions; // NULL: automatic map, or by
+  int fields;    // arrays of the meshes
+  ep_map_field *field;
   int landmarks;
   ep_scene_landmark *landmark;
   ep_map_frame frame;

@@ -38,6 +38,33 @@ static ep_status read_landmark(const ep_scene_reader *r, const char *key, const 
   return EP_OK;
 }
 
+static ep_status read_field(const ep_scene_reader *r, const char *key, const raw_map_field *raw,
+                            ep_map_field *out) {
+  const char *object = raw->object ? raw->object : raw->name;
+  const char *rest = raw->rest ? raw->rest : object;
+  if (!object)
+    return ep_read_refuse(r, key, "give a name for all shapes, or object (and rest, poses)");
+  EP_TRY(ep_read_text(r, object, &out->object));
+  EP_TRY(ep_read_text(r, rest, &out->rest));
+  return raw->poses ? ep_read_text(r, raw->poses, &out->poses) : EP_OK;
+}
+
+static ep_status read_fields(const ep_scene_reader *r, unsigned index, const raw_map *raw,
+                             ep_family *out) {
+  char key[64];
+  snprintf(key, sizeof key, "families.%u.map.fields", index);
+  if (raw->fields_count && raw->regions)
+    return ep_read_refuse(r, key, "give regions or fields, not both");
+  out->field = calloc(raw->fields_count + 1, sizeof *out->field);
+  if (!out->field) return ep_read_no_memory(r);
+  for (unsigned i = 0; i < raw->fields_count; i++) {
+    snprintf(key, sizeof key, "families.%u.map.fields.%u", index, i);
+    out->fields++;
+    EP_TRY(read_field(r, key, &raw->fields[i], &out->field[i]));
+  }
+  return EP_OK;
+}
+
 static ep_status read_map(const ep_scene_reader *r, unsigned index, const raw_map *raw,
                           ep_family *out) {
   char key[64];
@@ -54,6 +81,7 @@ static ep_status read_map(const ep_scene_reader *r, unsigned index, const raw_ma
     out->landmarks++;
     EP_TRY(read_landmark(r, key, &raw->landmarks[i], out, &out->landmark[i]));
   }
+  EP_TRY(read_fields(r, index, raw, out));
   snprintf(key, sizeof key, "families.%u.map.regions", index);
   return raw->regions ? ep_read_file(r, key, raw->regions, &out->regions) : EP_OK;
 }

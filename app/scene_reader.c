@@ -58,14 +58,31 @@ ep_status ep_read_file(const ep_scene_reader *r, const char *key, const char *pa
   return ep_read_text(r, joined, out);
 }
 
-ep_status ep_read_selection(const ep_scene_reader *r, const char *key, const raw_box *box,
-                            const raw_plane *plane, const char *path, ep_selection *out) {
+// An array of the object's vertices; whether the mesh has it shows when the mesh is read.
+static ep_status field_selection(const ep_scene_reader *r, const char *key,
+                                 const raw_selection *raw, ep_selection *out) {
+  char part[96];
+  out->kind = EP_SELECT_FIELD;
+  out->equals = raw->equals != NULL;
+  snprintf(part, sizeof part, "%.63s.%s", key, out->equals ? "equals" : "above");
+  if (raw->above && raw->equals) return ep_read_refuse(r, key, "give one of above, equals");
+  EP_TRY(ep_read_number(r, part, out->equals ? raw->equals : raw->above, 0.5, -1e300, 1e300,
+                        &out->value));
+  return ep_read_text(r, raw->field, &out->path);
+}
+
+ep_status ep_read_selection(const ep_scene_reader *r, const char *key, const raw_selection *raw,
+                            ep_selection *out) {
+  const raw_box *box = raw->box;
+  const raw_plane *plane = raw->plane;
   snprintf(out->key, sizeof out->key, "%s", key);
-  if ((box != NULL) + (plane != NULL) + (path != NULL) != 1)
-    return ep_read_refuse(r, key, "give one of box, plane, file");
-  if (path) {
+  if (!!box + !!plane + !!raw->file + !!raw->field != 1)
+    return ep_read_refuse(r, key, "give one of box, plane, file, field");
+  if (raw->field) return field_selection(r, key, raw, out);
+  if (raw->above || raw->equals) return ep_read_refuse(r, key, "above and equals need a field");
+  if (raw->file) {
     out->kind = EP_SELECT_FILE;
-    return ep_read_file(r, key, path, &out->path);
+    return ep_read_file(r, key, raw->file, &out->path);
   }
   out->kind = box ? EP_SELECT_BOX : EP_SELECT_PLANE;
   EP_TRY(ep_read_vector(r, key, box ? box->low : plane->point, out->a));

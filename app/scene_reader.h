@@ -29,9 +29,9 @@ ep_status ep_read_vector(const ep_scene_reader *r, const char *key, const double
 ep_status ep_read_text(const ep_scene_reader *r, const char *text, char **out); // malloc'd
 // Resolve a path relative to the scene and see that the file is there; malloc'd.
 ep_status ep_read_file(const ep_scene_reader *r, const char *key, const char *path, char **out);
-// Exactly one of box, plane, path is not NULL.
-ep_status ep_read_selection(const ep_scene_reader *r, const char *key, const raw_box *box,
-                            const raw_plane *plane, const char *path, ep_selection *out);
+// Exactly one of box, plane, file, field must be given.
+ep_status ep_read_selection(const ep_scene_reader *r, const char *key, const raw_selection *raw,
+                            ep_selection *out);
 // A local gradient-based algorithm of NLopt by name; whether NLopt has it shows when it is made.
 ep_status ep_read_algorithm(const ep_scene_reader *r, const char *key, const char *name,
                             char out[48]);

@@ -9,7 +9,9 @@ static ep_status read_region(const ep_scene_reader *r, const char *key, const ch
                              const raw_region *raw, ep_scene_region *out) {
   char part[96];
   EP_TRY(ep_read_text(r, name, &out->name));
-  EP_TRY(ep_read_selection(r, key, raw->box, raw->plane, raw->file, &out->where));
+  const raw_selection where = {raw->box,   raw->plane, raw->file,
+                               raw->field, raw->above, raw->equals};
+  EP_TRY(ep_read_selection(r, key, &where, &out->where));
   snprintf(part, sizeof part, "%.63s.soft", key);
   EP_TRY(ep_read_number(r, part, raw->soft, 0, 0, 1e12, &out->soft));
   snprintf(part, sizeof part, "%.63s.strength", key);
@@ -47,7 +49,8 @@ ep_status ep_read_regions(const ep_scene_reader *r, const raw_scene *raw, ep_sce
 
 static bool same_place(const ep_selection *a, const ep_selection *b) {
   if (a->kind != b->kind) return false;
-  if (a->kind == EP_SELECT_FILE) return strcmp(a->path, b->path) == 0;
+  if (a->path)
+    return strcmp(a->path, b->path) == 0 && a->value == b->value && a->equals == b->equals;
   for (int i = 0; i < 3; i++)
     if (a->a[i] != b->a[i] || a->b[i] != b->b[i]) return false;
   return true;
@@ -61,7 +64,7 @@ static bool same_region(const ep_scene_region *a, const ep_scene_region *b) {
 // One given in a family is called after that family; the same text in two families is one region.
 ep_status ep_read_family_region(const ep_scene_reader *r, const char *key, const char *family,
                                 const raw_region *raw, ep_scene *scene, int *number) {
-  const bool place = raw->box || raw->plane || raw->file;
+  const bool place = raw->box || raw->plane || raw->file || raw->field;
   if (raw->name && (place || raw->soft || raw->eigenfunctions || raw->strength))
     return ep_read_refuse(r, key,
                           "give the name of one of `regions`, or a place of its own, not both");

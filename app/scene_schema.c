@@ -75,6 +75,9 @@ static const cyaml_schema_field_t selection_fields[] = {
     PART(raw_selection, box, box_fields),
     PART(raw_selection, plane, plane_fields),
     TEXT(raw_selection, file),
+    TEXT(raw_selection, field),
+    NUMBER(raw_selection, above),
+    NUMBER(raw_selection, equals),
     CYAML_FIELD_END,
 };
 static const cyaml_schema_value_t selection = {
@@ -108,8 +111,16 @@ static const cyaml_schema_field_t landmark_fields[] = {
 };
 static const cyaml_schema_value_t landmark = {
     CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, raw_landmark, landmark_fields)};
+static const cyaml_schema_field_t map_field_fields[] = {
+    TEXT(raw_map_field, name), TEXT(raw_map_field, object),
+    TEXT(raw_map_field, rest), TEXT(raw_map_field, poses),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_value_t map_field = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, raw_map_field, map_field_fields)};
 static const cyaml_schema_field_t map_fields[] = {
     TEXT(raw_map, regions),
+    CYAML_FIELD_SEQUENCE("fields", OPTIONAL, raw_map, fields, &map_field, 0, 256),
     CYAML_FIELD_SEQUENCE("landmarks", OPTIONAL, raw_map, landmarks, &landmark, 0, 64),
     CYAML_FIELD_ENUM_PTR("frame", OPTIONAL | CYAML_FLAG_STRICT, raw_map, frame, frame_names,
                          CYAML_ARRAY_LEN(frame_names)),
@@ -123,6 +134,9 @@ static const cyaml_schema_field_t region_fields[] = {
     PART(raw_region, box, box_fields),
     PART(raw_region, plane, plane_fields),
     TEXT(raw_region, file),
+    TEXT(raw_region, field),
+    NUMBER(raw_region, above),
+    NUMBER(raw_region, equals),
     NUMBER(raw_region, soft),
     NUMBER(raw_region, eigenfunctions),
     NUMBER(raw_region, strength),
@@ -194,6 +208,9 @@ static const cyaml_schema_field_t push_fields[] = {
     PART(raw_push, box, box_fields),
     PART(raw_push, plane, plane_fields),
     TEXT(raw_push, file),
+    TEXT(raw_push, field),
+    NUMBER(raw_push, above),
+    NUMBER(raw_push, equals),
     VECTOR(raw_push, force),
     NUMBER(raw_push, from),
     NUMBER(raw_push, until),

@@ -16,7 +16,8 @@ typedef struct raw_plane {
 typedef struct raw_selection {
   raw_box *box;
   raw_plane *plane;
-  char *file;
+  char *file, *field;
+  double *above, *equals;
 } raw_selection;
 typedef struct raw_material {
   int *model;
@@ -33,8 +34,13 @@ typedef struct raw_landmark {
   double *poses; // vertices
   unsigned poses_count;
 } raw_landmark;
+typedef struct raw_map_field {
+  char *name, *object, *rest, *poses;
+} raw_map_field;
 typedef struct raw_map {
   char *regions;
+  raw_map_field *fields;
+  unsigned fields_count;
   raw_landmark *landmarks;
   unsigned landmarks_count;
   int *frame;
@@ -45,7 +51,8 @@ typedef struct raw_region {
   char *name;
   raw_box *box;
   raw_plane *plane;
-  char *file;
+  char *file, *field;
+  double *above, *equals;
   double *soft, *eigenfunctions, *strength;
 } raw_region;
 typedef struct raw_family {
@@ -80,7 +87,8 @@ typedef struct raw_examples {
 typedef struct raw_push {
   raw_box *box;
   raw_plane *plane;
-  char *file;
+  char *file, *field;
+  double *above, *equals;
   double force[3];
   double *from, *until, *ramp;
 } raw_push;

@@ -4,7 +4,26 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "app/point_data.h"
 #include "base/files.h"
+
+// The marks of an array on the vertices.
+static ep_status by_field(const ep_selection *s, const ep_mesh *mesh, unsigned char *chosen,
+                          int *count, ep_error *err) {
+  const double *value;
+  EP_TRY(ep_scalar_of(mesh, s->key, s->path, &value, err));
+  for (int v = 0; v < mesh->nv; v++) {
+    if (s->equals ? value[v] != s->value : !(value[v] > s->value)) continue;
+    chosen[v] = 1;
+    (*count)++;
+  }
+  if (*count) return EP_OK;
+  double low, high;
+  ep_scalar_range(mesh, value, &low, &high);
+  return ep_fail(err, EP_ERR_SCENE, "%s: no vertex of %s has '%s' %s %g; its values are %g to %g",
+                 s->key, mesh->name, s->path, s->equals ? "equal to" : "above", s->value, low,
+                 high);
+}
 
 static bool inside(const ep_selection *s, const double *x) {
   if (s->kind == EP_SELECT_BOX) {
@@ -73,6 +92,7 @@ ep_status ep_select_parse(const char *name, const char *text, const ep_mesh *mes
 ep_status ep_select_vertices(const ep_selection *selection, const ep_mesh *mesh,
                              unsigned char *chosen, int *count, ep_error *err) {
   *count = 0;
+  if (selection->kind == EP_SELECT_FIELD) return by_field(selection, mesh, chosen, count, err);
   if (selection->kind == EP_SELECT_FILE) {
     char *text;
     size_t size;

@@ -1,6 +1,6 @@
-// Replays the corpus of one fuzz target (EP_CORPUS) and EP_MUTATIONS bounded, repeatable mutations
-// of each of its files: bytes changed, taken out, doubled, cut off, and numbers replaced by nasty
-// ones. Runs with any compiler.
+// Replays the corpus of one fuzz target (the folder EP_CORPUS) and EP_MUTATIONS bounded, repeatable
+// mutations of each of its files: bytes changed, taken out, doubled, cut off, and numbers replaced
+// by nasty ones. Runs with any compiler.
 #include <dirent.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -32,7 +32,7 @@ static int by_name(const void *a, const void *b) {
 }
 
 static void load(corpus *c) {
-  static const char folder[] = EP_SOURCE_DIR "/tests/fuzz/corpus/" EP_CORPUS;
+  static const char folder[] = EP_CORPUS;
   DIR *dir = opendir(folder);
   assert_non_null(dir);
   for (struct dirent *entry; (entry = readdir(dir)) && c->count < MOST_SEEDS;) {
