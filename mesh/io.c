@@ -21,6 +21,8 @@ static ep_status run_reader(ep_mesh_format format, ep_raw_mesh *raw, ep_scan sca
     return ep_read_medit(raw, scan, err);
   case EP_MESH_TETGEN:
     return ep_read_tetgen(raw, scan, folder, err);
+  case EP_MESH_VTU:
+    return ep_read_vtu(raw, scan, err);
   case EP_MESH_FORMATS:
     break;
   }
@@ -47,8 +49,9 @@ static ep_mesh_format format_of(const char *path) {
   static const struct {
     const char *extension;
     ep_mesh_format format;
-  } known[] = {{"veg", EP_MESH_VEG},    {"msh", EP_MESH_MSH},     {"vtk", EP_MESH_VTK},
-               {"mesh", EP_MESH_MEDIT}, {"node", EP_MESH_TETGEN}, {"ele", EP_MESH_TETGEN}};
+  } known[] = {{"veg", EP_MESH_VEG},   {"msh", EP_MESH_MSH},    {"vtk", EP_MESH_VTK},
+               {"vtu", EP_MESH_VTU},   {"mesh", EP_MESH_MEDIT}, {"node", EP_MESH_TETGEN},
+               {"ele", EP_MESH_TETGEN}};
   const char *extension = ep_path_extension(path);
   for (size_t i = 0; i < sizeof known / sizeof *known; i++)
     if (strcasecmp(extension, known[i].extension) == 0) return known[i].format;
@@ -72,7 +75,7 @@ ep_status ep_mesh_read(const char *path, ep_mesh *out, ep_mesh_findings *finding
   const ep_mesh_format format = format_of(path);
   if (format == EP_MESH_FORMATS)
     return ep_fail(err, EP_ERR_FORMAT,
-                   "%s: mesh files end in .veg, .msh, .vtk, .mesh, .node or .ele", path);
+                   "%s: mesh files end in .veg, .msh, .vtk, .vtu, .mesh, .node or .ele", path);
   char file[EP_PATH_MAX], folder[EP_PATH_MAX];
   EP_TRY(path_to_read(path, file, err));
   EP_TRY(ep_path_folder(file, folder, err));

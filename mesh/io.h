@@ -1,5 +1,6 @@
 // Mesh files: readers for .veg, .msh (2.2, 4.1; ASCII, binary), .vtk (legacy 4.2, 5.1; ASCII,
-// binary), .mesh (Medit), .node/.ele (TetGen); writers .veg, .vtu, .pvd.
+// binary), .vtu (text, base64, raw; zlib), .mesh (Medit), .node/.ele (TetGen); writers .veg, .vtu,
+// .pvd. Scalars on the vertices of .vtk and .vtu are kept in the mesh.
 #ifndef EP_MESH_IO_H
 #define EP_MESH_IO_H
 
@@ -22,6 +23,7 @@ typedef enum ep_mesh_format {
   EP_MESH_VTK,
   EP_MESH_MEDIT,
   EP_MESH_TETGEN,
+  EP_MESH_VTU,
   EP_MESH_FORMATS
 } ep_mesh_format;
 ep_status ep_mesh_parse(ep_mesh_format format, const char *name, const char *bytes, size_t size,

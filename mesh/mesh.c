@@ -32,6 +32,20 @@ static bool copy_array(const void *from, size_t count, size_t size, void **to) {
   return *to != NULL;
 }
 
+static bool copy_data(const ep_mesh *from, ep_point_data **to) {
+  const size_t nv = (size_t)from->nv;
+  *to = calloc((size_t)from->ndata + 1, sizeof **to);
+  bool good = *to != NULL;
+  for (int i = 0; good && i < from->ndata; i++) {
+    const ep_point_data *data = &from->data[i];
+    void *value;
+    good = copy_array(data->value, nv, sizeof(double), &value);
+    (*to)[i] = (ep_point_data){strdup(data->name), data->components, value};
+    good &= (*to)[i].name != NULL;
+  }
+  return good;
+}
+
 ep_status ep_mesh_copy(const ep_mesh *mesh, ep_mesh *out, ep_error *err) {
   const size_t nv = (size_t)mesh->nv, nt = (size_t)mesh->nt;
   void *x, *tet, *file_vertex, *material, *tet_material;
@@ -40,7 +54,11 @@ ep_status ep_mesh_copy(const ep_mesh *mesh, ep_mesh *out, ep_error *err) {
   good &= copy_array(mesh->file_vertex, nv, sizeof(int), &file_vertex);
   good &= copy_array(mesh->material, (size_t)mesh->nmaterials, sizeof(ep_elastic), &material);
   good &= copy_array(mesh->tet_material, nt, sizeof(int), &tet_material);
+  ep_point_data *data;
+  good &= copy_data(mesh, &data);
   *out = *mesh;
+  out->data = data;
+  out->ndata = data ? mesh->ndata : 0;
   out->x = x;
   out->tet = tet;
   out->file_vertex = file_vertex;
@@ -51,12 +69,27 @@ ep_status ep_mesh_copy(const ep_mesh *mesh, ep_mesh *out, ep_error *err) {
   return ep_fail(err, EP_ERR_MEMORY, "no memory for a copy of the mesh %s", mesh->name);
 }
 
+void ep_point_data_free(ep_point_data *data, int count) {
+  for (int i = 0; i < count; i++) {
+    free(data[i].name);
+    free(data[i].value);
+  }
+  free(data);
+}
+
+const ep_point_data *ep_mesh_data(const ep_mesh *mesh, const char *name) {
+  for (int i = 0; i < mesh->ndata; i++)
+    if (strcmp(mesh->data[i].name, name) == 0) return &mesh->data[i];
+  return NULL;
+}
+
 void ep_mesh_free(ep_mesh *mesh) {
   free(mesh->x);
   free(mesh->tet);
   free(mesh->file_vertex);
   free(mesh->material);
   free(mesh->tet_material);
+  ep_point_data_free(mesh->data, mesh->ndata);
   memset(mesh, 0, sizeof *mesh);
 }
 
@@ -64,6 +97,11 @@ void ep_mesh_report(const ep_mesh *mesh, const ep_mesh_findings *f, ep_log *log)
   const char *name = mesh->name;
   if (f->dropped_cells)
     ep_notice(log, "%s: %d cells that are not linear tets were left out", name, f->dropped_cells);
+  if (f->unread_arrays)
+    ep_notice(log,
+              "%s: array '%s' of the points is no numbers: it was not read, in .vtk neither "
+              "what follows it",
+              name, f->first_unread_array);
   if (f->repaired_orientation)
     ep_notice(log, "%s: %d inverted tets were turned round", name, f->repaired_orientation);
   if (f->repeated_tets)

@@ -14,6 +14,14 @@ typedef struct ep_elastic {
   double poisson; // in [0, 0.5)
 } ep_elastic;
 
+// An array on the vertices as it stands in the file: labels, painted weights, results. Only scalars
+// are kept, of the others name and number of components.
+typedef struct ep_point_data {
+  char *name;
+  int components;
+  double *value; // (nv), NaN where the file says so; NULL where components != 1
+} ep_point_data;
+
 // Vertices no tet uses are left out on reading; file_vertex gives each vertex's place in the file
 // (counted from 0), so that vertex lists made for the file can be translated. In Gmsh files, whose
 // numbers may have gaps, the place is the number less 1 (less 0 if there is a vertex 0).
@@ -26,9 +34,12 @@ typedef struct ep_mesh {
   int nmaterials;       // 0 where the file names none
   ep_elastic *material; // (nmaterials)
   int *tet_material;    // (nt) index into material; NULL where nmaterials == 0
+  int ndata;            // arrays of the vertices (.vtk, .vtu)
+  ep_point_data *data;  // (ndata)
   char name[256];       // file path, for messages
 } ep_mesh;
 
+enum { EP_UNREAD_MAX = 64 };
 // What reading and checking found; all counts, first offender by index in the file, from 0.
 typedef struct ep_mesh_findings {
   int repaired_orientation; // tets turned round
@@ -37,6 +48,8 @@ typedef struct ep_mesh_findings {
   int first_duplicate, first_degenerate, first_unused; // -1 where none
   int repeated_tets;  // tets with the same four vertices as an earlier one: left out
   int first_repeated; // -1 where none; first_degenerate and this count all tets of the file
+  int unread_arrays; // of the vertices that are no numbers; in .vtk what follows is not read either
+  char first_unread_array[EP_UNREAD_MAX];
 } ep_mesh_findings;
 
 // Takes ownership of nothing: copies x (nv x 3) and tet (nt x 4); turns inverted tets round, drops
@@ -46,6 +59,9 @@ ep_status ep_mesh_make(int nv, const double *x, int nt, const int *tet, const ch
                        ep_mesh *out, ep_mesh_findings *findings, ep_error *err);
 ep_status ep_mesh_copy(const ep_mesh *mesh, ep_mesh *out, ep_error *err);
 void ep_mesh_free(ep_mesh *mesh);
+void ep_point_data_free(ep_point_data *data, int count);
+// The first array of that name, NULL where there is none.
+const ep_point_data *ep_mesh_data(const ep_mesh *mesh, const char *name);
 
 // Say the findings on the log, a line each; nothing for a clean mesh.
 void ep_mesh_report(const ep_mesh *mesh, const ep_mesh_findings *findings, ep_log *log);

@@ -50,12 +50,38 @@ void ep_raw_drop(ep_raw_mesh *raw, bool higher_order_tet) {
   if (higher_order_tet && raw->quadratic < INT_MAX) raw->quadratic++;
 }
 
+ep_status ep_raw_data(ep_raw_mesh *raw, ep_token name, int components, double **value,
+                      ep_error *err) {
+  void *array = raw->data;
+  ep_status status =
+      ep_grow(&array, &raw->room_data, raw->ndata + 1, sizeof *raw->data, raw->name, err);
+  raw->data = array;
+  *value = NULL;
+  if (status != EP_OK) return status;
+  ep_point_data *data = &raw->data[raw->ndata];
+  *data = (ep_point_data){.components = components};
+  data->name = strndup(name.text, (size_t)(name.length < EP_NAME_MAX ? name.length : EP_NAME_MAX));
+  if (components == 1) data->value = calloc((size_t)raw->nv + 1, sizeof *data->value);
+  raw->ndata++;
+  *value = data->value;
+  if (data->name && (data->value || components != 1)) return EP_OK;
+  return ep_fail(err, EP_ERR_MEMORY, "no memory for the mesh %s", raw->name);
+}
+
+void ep_raw_unread(ep_raw_mesh *raw, ep_token name) {
+  if (raw->unread++) return;
+  const int most = EP_UNREAD_MAX - 1, length = name.length < most ? name.length : most;
+  memcpy(raw->first_unread, name.text, (size_t)length);
+  raw->first_unread[length] = '\0';
+}
+
 void ep_raw_free(ep_raw_mesh *raw) {
   free(raw->x);
   free(raw->number);
   free(raw->tet);
   free(raw->material);
   free(raw->tet_material);
+  ep_point_data_free(raw->data, raw->ndata);
   *raw = (ep_raw_mesh){.name = raw->name};
 }
 
@@ -101,6 +127,8 @@ static ep_status compress_vertices(ep_raw_mesh *raw, ep_mesh *out, ep_mesh_findi
       continue;
     }
     memmove(raw->x + 3 * kept, raw->x + 3 * i, 3 * sizeof(double));
+    for (int k = 0; k < raw->ndata; k++)
+      if (raw->data[k].value) raw->data[k].value[kept] = raw->data[k].value[i];
     out->file_vertex[kept] = number;
     place[i] = kept++;
   }
@@ -118,10 +146,14 @@ static void move_arrays(ep_raw_mesh *raw, ep_mesh *out) {
   out->nmaterials = raw->nmaterials;
   out->material = raw->material;
   out->tet_material = raw->tet_material;
+  out->ndata = raw->ndata;
+  out->data = raw->data;
   raw->x = NULL;
   raw->tet = NULL;
   raw->material = NULL;
   raw->tet_material = NULL;
+  raw->data = NULL;
+  raw->ndata = 0;
 }
 
 // The end of a long path says more than its beginning.
@@ -136,7 +168,9 @@ ep_status ep_raw_finish(ep_raw_mesh *raw, ep_mesh *out, ep_mesh_findings *findin
                         .first_duplicate = -1,
                         .first_degenerate = -1,
                         .first_unused = -1,
-                        .first_repeated = -1};
+                        .first_repeated = -1,
+                        .unread_arrays = raw->unread};
+  memcpy(f.first_unread_array, raw->first_unread, sizeof f.first_unread_array);
   memset(out, 0, sizeof *out);
   ep_status status;
   EP_TRY_GOTO(status, check_contents(raw, err), done);

@@ -6,9 +6,12 @@
 #include <stddef.h>
 
 #include "mesh/mesh.h"
+#include "mesh/scan.h"
 
 // 12 numbers a tet still fit an int.
 enum { EP_MESH_LIMIT = 1 << 27 };
+// Names of arrays are cut to fit.
+enum { EP_NAME_MAX = 128 };
 
 typedef struct ep_raw_mesh {
   const char *name; // not owned
@@ -21,10 +24,20 @@ typedef struct ep_raw_mesh {
   int nmaterials;
   ep_elastic *material;
   int *tet_material; // (nt)
+  int ndata, room_data;
+  ep_point_data *data; // values (nv)
+  int unread;          // arrays of the points that are no numbers
+  char first_unread[EP_UNREAD_MAX];
 } ep_raw_mesh;
 
 ep_status ep_raw_vertex(ep_raw_mesh *raw, const double x[3], ep_error *err);
 ep_status ep_raw_tet(ep_raw_mesh *raw, const int vertex[4], ep_error *err);
+// A further array of the points, of which nv must have been read. *value (nv, owned by raw) is to
+// be filled in; NULL where the array is no scalar, which is remembered by name only.
+ep_status ep_raw_data(ep_raw_mesh *raw, ep_token name, int components, double **value,
+                      ep_error *err);
+// Remember an array that is no numbers.
+void ep_raw_unread(ep_raw_mesh *raw, ep_token name);
 // Count a cell that is no linear tet.
 void ep_raw_drop(ep_raw_mesh *raw, bool higher_order_tet);
 // Checks and repairs as ep_mesh_make says, moves everything into out. raw is empty afterwards,

@@ -179,6 +179,21 @@ ep_status ep_scan_double(ep_scan *scan, const char *what, double *out, ep_error 
   return EP_OK;
 }
 
+ep_status ep_scan_any_double(ep_scan *scan, const char *what, double *out, ep_error *err) {
+  static const char *const words[] = {"nan", "inf", "infinity"};
+  const ep_token token = ep_scan_peek(scan);
+  const int sign = token.length && (token.text[0] == '-' || token.text[0] == '+');
+  const ep_token plain = {token.text + sign, token.length - sign};
+  for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+    if (ep_token_is(plain, words[i])) {
+      *out = NAN;
+      ep_token passed;
+      ep_scan_token(scan, &passed);
+      return EP_OK;
+    }
+  return ep_scan_double(scan, what, out, err);
+}
+
 ep_status ep_scan_doubles(ep_scan *scan, const char *what, int count, double *out, ep_error *err) {
   for (int i = 0; i < count; i++) EP_TRY(ep_scan_double(scan, what, out + i, err));
   return EP_OK;
@@ -223,10 +238,6 @@ ep_status ep_scan_i32(ep_scan *scan, bool swap, const char *what, int32_t *out, 
 }
 
 ep_status ep_scan_i64(ep_scan *scan, bool swap, const char *what, int64_t *out, ep_error *err) {
-  return take(scan, swap, what, sizeof *out, out, err);
-}
-
-ep_status ep_scan_f32(ep_scan *scan, bool swap, const char *what, float *out, ep_error *err) {
   return take(scan, swap, what, sizeof *out, out, err);
 }
 

@@ -58,6 +58,8 @@ ep_status ep_scan_long(ep_scan *scan, const char *what, long long low, long long
 ep_status ep_scan_int(ep_scan *scan, const char *what, int low, int high, int *out, ep_error *err);
 // A finite number: no "nan", "inf", hexadecimal, or anything behind it.
 ep_status ep_scan_double(ep_scan *scan, const char *what, double *out, ep_error *err);
+// Data may hold "nan" and infinities: both give NaN.
+ep_status ep_scan_any_double(ep_scan *scan, const char *what, double *out, ep_error *err);
 ep_status ep_scan_doubles(ep_scan *scan, const char *what, int count, double *out, ep_error *err);
 // Pass over count tokens that must be numbers.
 ep_status ep_scan_skip_numbers(ep_scan *scan, long long count, const char *what, ep_error *err);
@@ -67,7 +69,6 @@ ep_status ep_scan_skip_numbers(ep_scan *scan, long long count, const char *what,
 ep_status ep_scan_need(const ep_scan *scan, uint64_t bytes, const char *what, ep_error *err);
 ep_status ep_scan_i32(ep_scan *scan, bool swap, const char *what, int32_t *out, ep_error *err);
 ep_status ep_scan_i64(ep_scan *scan, bool swap, const char *what, int64_t *out, ep_error *err);
-ep_status ep_scan_f32(ep_scan *scan, bool swap, const char *what, float *out, ep_error *err);
 ep_status ep_scan_f64(ep_scan *scan, bool swap, const char *what, double *out, ep_error *err);
 bool ep_machine_big_endian(void);
 

@@ -1,36 +1,20 @@
 // Legacy VTK files with an unstructured grid: version 2 to 4.2 (cells as "count i j k l") and 5.x
-// (OFFSETS and CONNECTIVITY), ASCII and binary (big-endian). Point and cell data are not read.
-#include <limits.h>
+// (OFFSETS and CONNECTIVITY), ASCII and binary (big-endian).
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "mesh/readers.h"
+#include "mesh/vtk.h"
 
-enum { VTK_TETRA = 10, VTK_QUADRATIC_TETRA = 24, VTK_LAGRANGE_TETRA = 71, VTK_BEZIER_TETRA = 78 };
+enum { VTK_QUADRATIC_TETRA = 24, VTK_LAGRANGE_TETRA = 71, VTK_BEZIER_TETRA = 78 };
 
-typedef enum number_type { INT8, INT16, INT32, INT64, FLOAT32, FLOAT64 } number_type;
-
-typedef struct int_list {
-  int *data;
-  int count, room;
-} int_list;
-
-typedef struct vtk {
-  ep_raw_mesh *raw;
-  ep_scan scan;
-  bool binary, offsets; // offsets: cells as in version 5
-  bool have_points, have_cells, have_types;
-  int_list offset, vertex, type; // offset: (cells + 1) into vertex
-} vtk;
-
-static ep_status fail_here(vtk *f, ep_error *err, const char *what) {
+ep_status ep_vtk_fail(ep_vtk *f, ep_error *err, const char *what) {
   if (!f->binary) return ep_scan_fail(&f->scan, err, "%s", what);
   f->scan.at = f->scan.mark;
   return ep_scan_fail_byte(&f->scan, err, "%s", what);
 }
 
-static ep_status append_int(vtk *f, int_list *list, int value, ep_error *err) {
+static ep_status append_int(ep_vtk *f, ep_int_list *list, int value, ep_error *err) {
   void *data = list->data;
   const ep_status status =
       ep_grow(&data, &list->room, list->count + 1, sizeof value, f->raw->name, err);
@@ -41,22 +25,30 @@ static ep_status append_int(vtk *f, int_list *list, int value, ep_error *err) {
 
 // --- numbers: VTK's binary numbers are big-endian
 
-static size_t size_of(number_type type) {
-  static const size_t sizes[] = {1, 2, 4, 8, 4, 8};
-  return sizes[type];
-}
-
-static ep_status read_type(vtk *f, number_type *type, ep_error *err) {
+ep_status ep_vtk_read_type(ep_vtk *f, ep_number *type, ep_error *err) {
   static const struct {
     const char *word;
-    number_type type;
-  } known[] = {{"float", FLOAT32},       {"double", FLOAT64},       {"int", INT32},
-               {"unsigned_int", INT32},  {"long", INT64},           {"unsigned_long", INT64},
-               {"vtktypeint64", INT64},  {"vtktypeint32", INT32},   {"vtkIdType", INT32},
-               {"short", INT16},         {"unsigned_short", INT16}, {"char", INT8},
-               {"unsigned_char", INT8},  {"signed_char", INT8},     {"vtktypeuint64", INT64},
-               {"vtktypeuint32", INT32}, {"vtktypeuint8", INT8},    {"vtktypeint8", INT8},
-               {"vtktypeint16", INT16},  {"vtktypeuint16", INT16}};
+    ep_number type;
+  } known[] = {{"float", EP_FLOAT32},
+               {"double", EP_FLOAT64},
+               {"int", EP_INT32},
+               {"unsigned_int", EP_UINT32},
+               {"long", EP_INT64},
+               {"unsigned_long", EP_UINT64},
+               {"vtktypeint64", EP_INT64},
+               {"vtktypeint32", EP_INT32},
+               {"vtkIdType", EP_INT32},
+               {"short", EP_INT16},
+               {"unsigned_short", EP_UINT16},
+               {"char", EP_INT8},
+               {"unsigned_char", EP_UINT8},
+               {"signed_char", EP_INT8},
+               {"vtktypeuint64", EP_UINT64},
+               {"vtktypeuint32", EP_UINT32},
+               {"vtktypeuint8", EP_UINT8},
+               {"vtktypeint8", EP_INT8},
+               {"vtktypeint16", EP_INT16},
+               {"vtktypeuint16", EP_UINT16}};
   ep_token word;
   ep_scan_token(&f->scan, &word);
   for (size_t i = 0; i < sizeof known / sizeof *known; i++)
@@ -68,18 +60,13 @@ static ep_status read_type(vtk *f, number_type *type, ep_error *err) {
                       word.length < 40 ? word.length : 40, word.text);
 }
 
-static ep_status read_integer(vtk *f, number_type type, const char *what, int low, int high,
+static ep_status read_integer(ep_vtk *f, ep_number type, const char *what, int low, int high,
                               int *out, ep_error *err) {
   if (!f->binary) return ep_scan_int(&f->scan, what, low, high, out, err);
-  const bool swap = !ep_machine_big_endian();
-  int32_t narrow = 0;
-  int64_t value;
-  if (type == INT64) {
-    EP_TRY(ep_scan_i64(&f->scan, swap, what, &value, err));
-  } else {
-    EP_TRY(ep_scan_i32(&f->scan, swap, what, &narrow, err));
-    value = narrow;
-  }
+  EP_TRY(ep_scan_need(&f->scan, ep_number_size(type), what, err));
+  const int64_t value = ep_number_integer(type, f->scan.at, !ep_machine_big_endian());
+  f->scan.mark = f->scan.at;
+  f->scan.at += ep_number_size(type);
   if (value >= low && value <= high) {
     *out = (int)value;
     return EP_OK;
@@ -89,37 +76,32 @@ static ep_status read_integer(vtk *f, number_type type, const char *what, int lo
                            (long long)value, low, high);
 }
 
-static ep_status read_real(vtk *f, number_type type, double *out, ep_error *err) {
+static ep_status read_real(ep_vtk *f, ep_number type, double *out, ep_error *err) {
   if (!f->binary) return ep_scan_double(&f->scan, "a coordinate", out, err);
-  const bool swap = !ep_machine_big_endian();
-  float narrow;
-  if (type == FLOAT64) {
-    EP_TRY(ep_scan_f64(&f->scan, swap, "a coordinate", out, err));
-  } else {
-    EP_TRY(ep_scan_f32(&f->scan, swap, "a coordinate", &narrow, err));
-    *out = (double)narrow;
-  }
-  return isfinite(*out) ? EP_OK : fail_here(f, err, "a coordinate is not a finite number");
+  EP_TRY(ep_scan_need(&f->scan, ep_number_size(type), "a coordinate", err));
+  *out = ep_number_real(type, f->scan.at, !ep_machine_big_endian());
+  f->scan.mark = f->scan.at;
+  f->scan.at += ep_number_size(type);
+  return isfinite(*out) ? EP_OK : ep_vtk_fail(f, err, "a coordinate is not a finite number");
 }
 
-// Binary data begin behind the line that announces them.
-static void begin_data(vtk *f) {
+void ep_vtk_begin_data(ep_vtk *f) {
   if (f->binary) ep_scan_skip_line(&f->scan);
 }
 
 // --- sections
 
-static ep_status read_points(vtk *f, ep_error *err) {
+static ep_status read_points(ep_vtk *f, ep_error *err) {
   int count;
-  number_type type = INT64;
+  ep_number type = EP_INT64;
   if (f->have_points) return ep_scan_fail(&f->scan, err, "a second section POINTS");
   f->have_points = true;
   EP_TRY(ep_scan_int(&f->scan, "the number of points", 0, EP_MESH_LIMIT, &count, err));
-  EP_TRY(read_type(f, &type, err));
-  if (f->binary && type != FLOAT32 && type != FLOAT64)
+  EP_TRY(ep_vtk_read_type(f, &type, err));
+  if (f->binary && type != EP_FLOAT32 && type != EP_FLOAT64)
     return ep_scan_fail_as(&f->scan, EP_ERR_UNSUPPORTED, err,
                            "points must be of type float or double");
-  begin_data(f);
+  ep_vtk_begin_data(f);
   for (int i = 0; i < count; i++) {
     double x[3];
     for (int k = 0; k < 3; k++) EP_TRY(read_real(f, type, x + k, err));
@@ -128,28 +110,30 @@ static ep_status read_points(vtk *f, ep_error *err) {
   return EP_OK;
 }
 
-static ep_status read_cell_vertex(vtk *f, number_type type, ep_error *err) {
+static ep_status read_cell_vertex(ep_vtk *f, ep_number type, ep_error *err) {
   int vertex;
   EP_TRY(read_integer(f, type, "a vertex of a cell", 0, f->raw->nv - 1, &vertex, err));
   return append_int(f, &f->vertex, vertex, err);
 }
 
 // "CELLS n size", then for each cell its number of vertices and these; size counts all numbers.
-static ep_status read_cells_4(vtk *f, int cells, int size, ep_error *err) {
-  begin_data(f);
+static ep_status read_cells_4(ep_vtk *f, int cells, int size, ep_error *err) {
+  ep_vtk_begin_data(f);
   EP_TRY(append_int(f, &f->offset, 0, err));
   for (int c = 0; c < cells; c++) {
     int count;
-    EP_TRY(read_integer(f, INT32, "the number of vertices of a cell", 0, size, &count, err));
-    if (count >= size) return fail_here(f, err, "the cells hold more numbers than CELLS announces");
+    EP_TRY(read_integer(f, EP_INT32, "the number of vertices of a cell", 0, size, &count, err));
+    if (count >= size)
+      return ep_vtk_fail(f, err, "the cells hold more numbers than CELLS announces");
     size -= count + 1;
-    for (int i = 0; i < count; i++) EP_TRY(read_cell_vertex(f, INT32, err));
+    for (int i = 0; i < count; i++) EP_TRY(read_cell_vertex(f, EP_INT32, err));
     EP_TRY(append_int(f, &f->offset, f->vertex.count, err));
   }
-  return size == 0 ? EP_OK : fail_here(f, err, "the cells hold fewer numbers than CELLS announces");
+  return size == 0 ? EP_OK
+                   : ep_vtk_fail(f, err, "the cells hold fewer numbers than CELLS announces");
 }
 
-static ep_status expect_word(vtk *f, const char *word, ep_error *err) {
+static ep_status expect_word(ep_vtk *f, const char *word, ep_error *err) {
   ep_token token;
   ep_scan_token(&f->scan, &token);
   if (ep_token_is(token, word)) return EP_OK;
@@ -157,12 +141,13 @@ static ep_status expect_word(vtk *f, const char *word, ep_error *err) {
 }
 
 // "CELLS n size", "OFFSETS type" and n numbers, "CONNECTIVITY type" and size numbers.
-static ep_status read_cells_5(vtk *f, int count, int size, ep_error *err) {
-  number_type type = INT64;
+static ep_status read_cells_5(ep_vtk *f, int count, int size, ep_error *err) {
+  ep_number type = EP_INT64;
   EP_TRY(expect_word(f, "OFFSETS", err));
-  EP_TRY(read_type(f, &type, err));
-  if (type != INT32 && type != INT64) return fail_here(f, err, "OFFSETS must be whole numbers");
-  begin_data(f);
+  EP_TRY(ep_vtk_read_type(f, &type, err));
+  if (type != EP_INT32 && type != EP_INT64)
+    return ep_vtk_fail(f, err, "OFFSETS must be whole numbers");
+  ep_vtk_begin_data(f);
   for (int i = 0, last = 0; i < count; i++) {
     int offset;
     EP_TRY(read_integer(f, type, "an offset", i ? last : 0, i ? size : 0, &offset, err));
@@ -170,17 +155,17 @@ static ep_status read_cells_5(vtk *f, int count, int size, ep_error *err) {
   }
   if (f->offset.count == 0) EP_TRY(append_int(f, &f->offset, 0, err));
   if (f->offset.data[f->offset.count - 1] != size)
-    return fail_here(f, err, "the last offset is not the number of entries CELLS announces");
+    return ep_vtk_fail(f, err, "the last offset is not the number of entries CELLS announces");
   EP_TRY(expect_word(f, "CONNECTIVITY", err));
-  EP_TRY(read_type(f, &type, err));
-  if (type != INT32 && type != INT64)
-    return fail_here(f, err, "CONNECTIVITY must be whole numbers");
-  begin_data(f);
+  EP_TRY(ep_vtk_read_type(f, &type, err));
+  if (type != EP_INT32 && type != EP_INT64)
+    return ep_vtk_fail(f, err, "CONNECTIVITY must be whole numbers");
+  ep_vtk_begin_data(f);
   for (int i = 0; i < size; i++) EP_TRY(read_cell_vertex(f, type, err));
   return EP_OK;
 }
 
-static ep_status read_cells(vtk *f, ep_error *err) {
+static ep_status read_cells(ep_vtk *f, ep_error *err) {
   int count, size;
   if (f->have_cells) return ep_scan_fail(&f->scan, err, "a second section CELLS");
   if (!f->have_points) return ep_scan_fail(&f->scan, err, "CELLS before POINTS");
@@ -190,7 +175,7 @@ static ep_status read_cells(vtk *f, ep_error *err) {
   return f->offsets ? read_cells_5(f, count, size, err) : read_cells_4(f, count, size, err);
 }
 
-static ep_status read_types(vtk *f, ep_error *err) {
+static ep_status read_types(ep_vtk *f, ep_error *err) {
   int count;
   if (f->have_types) return ep_scan_fail(&f->scan, err, "a second section CELL_TYPES");
   if (!f->have_cells) return ep_scan_fail(&f->scan, err, "CELL_TYPES before CELLS");
@@ -198,20 +183,19 @@ static ep_status read_types(vtk *f, ep_error *err) {
   EP_TRY(ep_scan_int(&f->scan, "the number of cell types", 0, EP_MESH_LIMIT, &count, err));
   if (count != f->offset.count - 1)
     return ep_scan_fail(&f->scan, err, "%d cell types for %d cells", count, f->offset.count - 1);
-  begin_data(f);
+  ep_vtk_begin_data(f);
   for (int c = 0; c < count; c++) {
     int type;
-    EP_TRY(read_integer(f, INT32, "a cell type", 0, 255, &type, err));
+    EP_TRY(read_integer(f, EP_INT32, "a cell type", 0, 255, &type, err));
     EP_TRY(append_int(f, &f->type, type, err));
     const int vertices = f->offset.data[c + 1] - f->offset.data[c];
-    if (type == VTK_TETRA && vertices != 4)
-      return fail_here(f, err, "a tet that does not have 4 vertices");
+    if (type == EP_VTK_TETRA && vertices != 4)
+      return ep_vtk_fail(f, err, "a tet that does not have 4 vertices");
   }
   return EP_OK;
 }
 
-// Key and value pairs of an array up to an empty line.
-static void skip_metadata(vtk *f) {
+void ep_vtk_skip_metadata(ep_vtk *f) {
   ep_scan *s = &f->scan;
   ep_scan_skip_line(s);
   while (s->at < s->end) {
@@ -223,49 +207,38 @@ static void skip_metadata(vtk *f) {
   }
 }
 
-// "FIELD name n", then n times "name components tuples type" and the numbers.
-static ep_status skip_field(vtk *f, ep_error *err) {
-  int arrays, components, tuples;
-  ep_token name;
-  number_type type = INT64;
-  ep_scan_token(&f->scan, &name);
-  EP_TRY(ep_scan_int(&f->scan, "the number of arrays", 0, EP_MESH_LIMIT, &arrays, err));
-  for (int i = 0; i < arrays; i++) {
-    if (ep_token_is(ep_scan_peek(&f->scan), "METADATA")) skip_metadata(f);
-    ep_scan_token(&f->scan, &name);
-    EP_TRY(ep_scan_int(&f->scan, "the components of an array", 0, INT_MAX, &components, err));
-    EP_TRY(ep_scan_int(&f->scan, "the tuples of an array", 0, INT_MAX, &tuples, err));
-    EP_TRY(read_type(f, &type, err));
-    const uint64_t count = (uint64_t)components * (uint64_t)tuples;
-    begin_data(f);
-    if (!f->binary) {
-      EP_TRY(ep_scan_skip_numbers(&f->scan, (long long)count, "a number of an array", err));
-      continue;
-    }
-    EP_TRY(ep_scan_need(&f->scan, count, "an array", err)); // so that the product fits
-    EP_TRY(ep_scan_need(&f->scan, count * size_of(type), "an array", err));
-    f->scan.at += count * size_of(type);
-  }
-  return EP_OK;
+// "POINT_DATA n" or "CELL_DATA n": the arrays that follow have n tuples.
+static ep_status begin_arrays(ep_vtk *f, bool of_points, ep_error *err) {
+  const int expected = of_points ? f->raw->nv : f->offset.count - 1;
+  if (!f->have_types) return ep_scan_fail(&f->scan, err, "point or cell data before CELL_TYPES");
+  EP_TRY(ep_scan_int(&f->scan, "the number of tuples", 0, EP_MESH_LIMIT, &f->tuples, err));
+  f->in_points = of_points;
+  if (f->tuples == expected) return EP_OK;
+  return ep_scan_fail(&f->scan, err, "data for %d %s, but there are %d", f->tuples,
+                      of_points ? "points" : "cells", expected);
 }
 
-static ep_status read_section(vtk *f, ep_token word, ep_error *err) {
+static ep_status read_section(ep_vtk *f, ep_token word, bool *stop, ep_error *err) {
+  bool taken;
   if (ep_token_is(word, "POINTS")) return read_points(f, err);
   if (ep_token_is(word, "CELLS")) return read_cells(f, err);
   if (ep_token_is(word, "CELL_TYPES")) return read_types(f, err);
-  if (ep_token_is(word, "FIELD")) return skip_field(f, err);
+  if (ep_token_is(word, "POINT_DATA")) return begin_arrays(f, true, err);
+  if (ep_token_is(word, "CELL_DATA")) return begin_arrays(f, false, err);
   if (ep_token_is(word, "METADATA")) {
-    skip_metadata(f);
+    ep_vtk_skip_metadata(f);
     return EP_OK;
   }
-  const char *text = "POINTS, CELLS or CELL_TYPES is expected here; does the section before hold "
-                     "more than it says?";
-  return fail_here(f, err, text);
+  EP_TRY(ep_vtk_read_data(f, word, &taken, stop, err));
+  if (taken) return EP_OK;
+  const char *text = "POINTS, CELLS, CELL_TYPES or an array is expected here; does the section "
+                     "before hold more than it says?";
+  return ep_vtk_fail(f, err, text);
 }
 
 // --- the file
 
-static ep_status read_header(vtk *f, ep_error *err) {
+static ep_status read_header(ep_vtk *f, ep_error *err) {
   static const char magic[] = "# vtk DataFile Version";
   ep_scan *s = &f->scan;
   ep_token word;
@@ -291,36 +264,34 @@ static ep_status read_header(vtk *f, ep_error *err) {
                          word.length < 40 ? word.length : 40, word.text);
 }
 
-static ep_status take_tets(vtk *f, ep_error *err) {
-  for (int c = 0; c < f->type.count; c++) {
-    const int type = f->type.data[c];
-    if (type == VTK_TETRA)
-      EP_TRY(ep_raw_tet(f->raw, f->vertex.data + f->offset.data[c], err));
-    else
-      ep_raw_drop(f->raw, type == VTK_QUADRATIC_TETRA || type == VTK_LAGRANGE_TETRA ||
-                              type == VTK_BEZIER_TETRA);
-  }
+ep_status ep_vtk_take_cell(ep_raw_mesh *raw, int type, const int *vertex, ep_error *err) {
+  if (type == EP_VTK_TETRA) return ep_raw_tet(raw, vertex, err);
+  ep_raw_drop(raw, type == VTK_QUADRATIC_TETRA || type == VTK_LAGRANGE_TETRA ||
+                       type == VTK_BEZIER_TETRA);
   return EP_OK;
 }
 
-static ep_status read_all(vtk *f, ep_error *err) {
+static ep_status take_cells(ep_vtk *f, ep_error *err) {
+  for (int c = 0; c < f->type.count; c++)
+    EP_TRY(ep_vtk_take_cell(f->raw, f->type.data[c], f->vertex.data + f->offset.data[c], err));
+  return EP_OK;
+}
+
+static ep_status read_all(ep_vtk *f, ep_error *err) {
   ep_token word;
   EP_TRY(read_header(f, err));
-  while (ep_scan_token(&f->scan, &word)) {
-    const bool data = ep_token_is(word, "POINT_DATA") || ep_token_is(word, "CELL_DATA");
-    if (data && f->have_types) break;
-    EP_TRY(read_section(f, word, err));
-  }
+  bool stop = false;
+  while (!stop && ep_scan_token(&f->scan, &word)) EP_TRY(read_section(f, word, &stop, err));
   if (!f->have_types)
     return ep_scan_fail(&f->scan, err, "there is no section %s",
                         !f->have_points  ? "POINTS"
                         : !f->have_cells ? "CELLS"
                                          : "CELL_TYPES");
-  return take_tets(f, err);
+  return take_cells(f, err);
 }
 
 ep_status ep_read_vtk(ep_raw_mesh *raw, ep_scan scan, ep_error *err) {
-  vtk f = {.raw = raw, .scan = scan};
+  ep_vtk f = {.raw = raw, .scan = scan, .tuples = -1};
   const ep_status status = read_all(&f, err);
   free(f.offset.data);
   free(f.vertex.data);

@@ -6,7 +6,7 @@ set -eu
 packages="
   build-essential cmake ninja-build pkg-config
   petsc-dev slepc-dev libopenmpi-dev libnlopt-dev libopenblas-dev liblapacke-dev
-  libjansson-dev libcyaml-dev libxxhash-dev libpng-dev
+  libjansson-dev libcyaml-dev libxxhash-dev libpng-dev zlib1g-dev
   libcmocka-dev clang clang-format gmsh
 "
 

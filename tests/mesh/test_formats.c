@@ -260,7 +260,9 @@ static void put_types(bytes *b, bool binary) {
   put(b, "\nCELL_TYPES 7\n");
   put_integer(b, binary, false, 5);
   for (int e = 0; e < 6; e++) put_integer(b, binary, false, 10);
-  put(b, "\nCELL_DATA 7\nSCALARS junk\n");
+  put(b, "\nCELL_DATA 7\nSCALARS id int\nLOOKUP_TABLE default\n");
+  for (int e = 0; e < 7; e++) put_integer(b, binary, false, e);
+  put(b, "\n");
 }
 
 static void put_vtk_4(bytes *b, bool binary, bool narrow) {

@@ -39,10 +39,19 @@ static const struct {
                   "3 0 1 0\n$EndNodes\n$Elements\n1\n1 4 0 1 2 3 9\n$EndElements\n"},
     {EP_MESH_VTK, "# vtk DataFile Version 4.2\nt\nASCII\nDATASET UNSTRUCTURED_GRID\n"
                   "POINTS 4 double\n0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 1 5\n4 0 1 2 3\n"
-                  "CELL_TYPES 1\n10\n"},
+                  "CELL_TYPES 1\n10\nPOINT_DATA 4\nSCALARS part int\nLOOKUP_TABLE default\n"
+                  "0 1 1 2\nVECTORS v int\n1 1 1 1 1 1 1 1 1 1 1 1\n"},
     {EP_MESH_MEDIT, "MeshVersionFormatted 2\nDimension 3\nVertices 4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n"
                     "0 0 1 0\nTetrahedra 1\n1 2 3 4 0\nEnd\n"},
     {EP_MESH_TETGEN, "4 3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n1 4\n1 1 2 3 4\n"},
+    {EP_MESH_VTU,
+     "<VTKFile type='UnstructuredGrid' compressor='vtkZLibDataCompressor'><Piece "
+     "NumberOfPoints='4' NumberOfCells='1'><PointData><DataArray type='UInt8' Name='part' "
+     "format='binary'>AQAAAAQAAAAAAAAADAAAAA==eJxjZGJmAQAAGAAL</DataArray></PointData><Points>"
+     "<DataArray type='Int32' NumberOfComponents='3'>0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points>"
+     "<Cells><DataArray type='Int32' Name='connectivity'>0 1 2 3</DataArray><DataArray "
+     "type='Int32' Name='offsets'>4</DataArray><DataArray type='UInt8' Name='types'>10"
+     "</DataArray></Cells></Piece></VTKFile>"},
 };
 
 // Parse, copy, surface; on failure everything made so far is freed.
