@@ -66,11 +66,11 @@ static void html_row(FILE *out, const ep_comparison *c, const ep_point *p, bool 
 }
 
 static const char STYLE[] =
-    "body{font:15px/1.5 system-ui,sans-serif;color:#1d2430;background:#fff;max-width:1240px;"
+    "body{font:15px/1.5 system-ui,sans-serif;color:#1d2430;background:#fff;max-width:1360px;"
     "margin:2rem auto;padding:0 1rem}h1{font-size:1.5rem;margin:0 0 .2rem}h2{font-size:1.1rem;"
     "margin:2rem 0 .5rem}p{margin:.4rem 0;max-width:60rem}svg{max-width:100%;height:auto}"
     ".scroll{overflow-x:auto}table{border-collapse:collapse;font-size:13px;"
-    "font-variant-numeric:tabular-nums}th,td{padding:.22rem .42rem;border-bottom:1px solid #dde2e7;"
+    "font-variant-numeric:tabular-nums}th,td{padding:.22rem .34rem;border-bottom:1px solid #dde2e7;"
     "text-align:right;white-space:nowrap}th:first-child{text-align:left;font-weight:500}"
     "thead th{border-bottom:2px solid #8a93a0;font-weight:600}tr.best{background:#e8f4ec}"
     "td.failed{color:#a11;text-align:left;white-space:normal}.note{color:#566070}"
