@@ -89,7 +89,8 @@ static ep_status fill(const ep_side *side, const int *sample, const int *owner, 
   out->phi = rows_of(n, sample, k, side->phi);
   out->mphi = malloc((size_t)n * k * sizeof *out->mphi);
   out->share = calloc((size_t)n, sizeof *out->share);
-  bool good = out->x && out->phi && out->mphi && out->share;
+  out->skin = rows_of(n, sample, 1, side->skin);
+  bool good = out->x && out->phi && out->mphi && out->share && out->skin;
   if (side->regions) {
     out->indicator = rows_of(n, sample, side->regions, side->indicator);
     out->region = rows_of(n, sample, side->regions, side->region);
@@ -112,7 +113,7 @@ ep_status ep_side_coarsen(const ep_side *side, int count, ep_side *out, int *sam
                           ep_error *err) {
   *out = *side;
   out->x = out->phi = out->mphi = out->share = out->indicator = out->region = NULL;
-  out->mark = out->mark_x = NULL;
+  out->mark = out->mark_x = out->skin = NULL;
   out->mark_near = NULL;
   memset(&out->stiffness, 0, sizeof out->stiffness);
   out->n = count;

@@ -9,16 +9,19 @@
 #include "linalg/dense.h"
 
 enum { FIRST_FUNCTIONS = 3, POLISH_ROUNDS = 4 };
+// Weight of the landmarks' splines: 1 was better than 2 or 4 on every pair but one.
+static const double SPLINE_WEIGHT = 1;
 // Landmarks pull what is near: width over the rms radius; softness of meeting them.
 static const double PULL_WIDTH = 0.5, PULL_SOFT = 0.02;
 
 typedef struct matcher {
   const ep_side *from, *to;
   const ep_match_rule *rule;
-  int regions, columns; // regions that take part; these and the landmarks
+  int regions, columns; // regions that take part; these, the skin and the landmarks
   double region_rms;    // of those columns of `from`, over its volume
   double *turned;       // (to->n x 3) to's positions in from's frame
-  double *smooth;       // (from->n x 3) from's positions moved by the kk-mode displacement
+  double *base;         // (from->n x 3) from's positions, warped by landmarks
+  double *smooth;       // (from->n x 3) those positions moved by the kk-mode displacement
   double *image;        // (from->n x max(k, 3)) values of `to` at p
   double *query, *target, *lead, *c, *d;
   double *pull, *gram, *marks; // landmarks: coefficients, their matrix, turned points of `to`
@@ -29,6 +32,7 @@ typedef struct matcher {
 
 static void free_matcher(matcher *w) {
   free(w->turned);
+  free(w->base);
   free(w->smooth);
   free(w->image);
   free(w->query);
@@ -66,10 +70,11 @@ static ep_status make_matcher(const ep_side *from, const ep_side *to, const doub
     for (int g = 0; g < from->regions; g++) w->regions += !rule->use || rule->use[g];
   if (w->regions) w->region_rms = root_mean_square(from, rule->use);
   const size_t nf = (size_t)from->n, nt = (size_t)to->n, k = (size_t)from->k;
-  w->columns = w->regions + (rule->mark_weight > 0 ? from->marks : 0);
+  w->columns = w->regions + 1 + (rule->mark_weight > 0 ? from->marks : 0);
   const size_t wide = k > 3 ? k : 3, d = (size_t)rule->k + 3 + (size_t)w->columns;
   const size_t marks = (size_t)from->marks;
   w->turned = malloc(3 * nt * sizeof(double));
+  w->base = malloc(3 * nf * sizeof(double));
   w->smooth = malloc(3 * nf * sizeof(double));
   w->image = malloc(wide * nf * sizeof(double));
   w->query = malloc(d * nf * sizeof(double));
@@ -80,15 +85,17 @@ static ep_status make_matcher(const ep_side *from, const ep_side *to, const doub
   w->pull = malloc((3 * marks + 1) * sizeof(double));
   w->gram = malloc((marks * marks + 1) * sizeof(double));
   w->marks = malloc((3 * marks + 1) * sizeof(double));
-  if (!w->pull || !w->gram || !w->marks || !w->turned || !w->smooth || !w->image || !w->query ||
-      !w->target || !w->lead || !w->c || !w->d) {
+  if (!w->pull || !w->gram || !w->marks || !w->turned || !w->base || !w->smooth || !w->image ||
+      !w->query || !w->target || !w->lead || !w->c || !w->d) {
     free_matcher(w);
     return ep_fail(err, EP_ERR_MEMORY, "no memory to match %d with %d vertices", from->n, to->n);
   }
   ep_frame_apply(to->n, r, to->x, w->turned);
-  memcpy(w->smooth, from->x, 3 * nf * sizeof(double));
   if (marks) ep_frame_apply(to->marks, r, to->mark_x, w->marks);
-  return EP_OK;
+  const ep_status status = ep_side_warp(from, w->marks, w->base, err);
+  memcpy(w->smooth, w->base, 3 * nf * sizeof(double));
+  if (status != EP_OK) free_matcher(w);
+  return status;
 }
 
 static double bump(const ep_side *side, const double *a, const double *b) {
@@ -150,7 +157,8 @@ static void pull(const matcher *w, const int *p, int width, const double *values
   }
 }
 
-// y = x + Pi (x_e[p] - x), Pi the projection on the constant and the first kk functions.
+// y = b + Pi (x_e[p] - b), b the (warped) positions, Pi the projection on the constant and the
+// first kk functions.
 static void smooth_positions(matcher *w, int kk, const int *p) {
   const ep_side *from = w->from;
   const int k = from->k;
@@ -158,7 +166,7 @@ static void smooth_positions(matcher *w, int kk, const int *p) {
   pull(w, p, 3, w->turned, w->image);
   for (int i = 0; i < from->n; i++)
     for (int c = 0; c < 3; c++) {
-      const double d = w->image[3 * (size_t)i + c] - from->x[3 * (size_t)i + c];
+      const double d = w->image[3 * (size_t)i + c] - w->base[3 * (size_t)i + c];
       w->image[3 * (size_t)i + c] = d;
       mean[c] += from->share[i] * d;
     }
@@ -167,7 +175,7 @@ static void smooth_positions(matcher *w, int kk, const int *p) {
   ep_gemm(from->n, 3, k, from->phi, w->d, w->smooth);
   for (int i = 0; i < from->n; i++)
     for (int c = 0; c < 3; c++)
-      w->smooth[3 * (size_t)i + c] += from->x[3 * (size_t)i + c] + mean[c];
+      w->smooth[3 * (size_t)i + c] += w->base[3 * (size_t)i + c] + mean[c];
 }
 
 // w->lead (to->n x kk) = Phi_to C^T with the leading kk x kk block of C.
@@ -187,15 +195,17 @@ static void fill(const matcher *w, const ep_side *side, const double *phi, int s
   const double level = sqrt(kk > 0 ? (double)kk : 1);
   const double a = w->rule->gamma * level / w->from->radius;
   const double b = w->regions ? w->rule->region_weight * level / w->region_rms : 0;
-  const double e = side->marks ? w->rule->mark_weight * level / sqrt(side->marks) : 0;
+  const double ball = side->marks ? w->rule->mark_weight / sqrt(side->marks) : 0;
+  const double e = level * (side->splines ? SPLINE_WEIGHT : ball);
   for (int i = 0; i < side->n; i++) {
     for (int f = 0; f < kk; f++) *out++ = phi[(size_t)i * stride + f];
     for (int c = 0; c < 3; c++) *out++ = a * x[3 * (size_t)i + c];
     for (int g = 0; g < side->regions && w->regions; g++)
       if (!w->rule->use || w->rule->use[g])
         *out++ = b * side->region[(size_t)i * side->regions + g];
-    for (int m = 0; m < w->columns - w->regions; m++)
+    for (int m = 0; m < w->columns - w->regions - 1; m++)
       *out++ = e * side->mark[(size_t)i * side->marks + m];
+    *out++ = w->rule->skin_weight * level * side->skin[i];
   }
 }
 

@@ -40,8 +40,10 @@ typedef struct ep_side {
   int regions;
   double *indicator; // (n x regions) 0 or 1
   double *region;    // (n x regions) smoothed
+  double *skin;      // (n) 1 on the boundary, 0 inside
   int marks;
-  double *mark;   // (n x marks) smooth bump around each landmark, mean square 1
+  bool splines;   // which functions the landmarks have
+  double *mark;   // (n x marks) smooth bump around each landmark, mean square 1; or its spline
   double *mark_x; // (marks x 3) landmarks, like x
   int *mark_near; // (marks) vertex nearest to each
 } ep_side;
@@ -54,6 +56,14 @@ ep_status ep_side_blur(const ep_side *side, double width, int columns, double *f
 // Errors: EP_ERR_ARGUMENT for a vertex out of range, a point outside the mesh.
 ep_status ep_side_landmarks(ep_side *side, int count, const ep_landmark *marks, bool is_from,
                             ep_error *err);
+// ---- spline.c
+// mark (n x marks) = for each landmark a smooth function, 1 there and 0 at the others.
+ep_status ep_side_splines(ep_side *side, ep_error *err);
+// y (n x 3): from's positions moved so that its landmarks come near their partners (marks x 3, in
+// from's frame): an affine part held towards the identity, the rest spread by the splines. Without
+// splines y = x.
+ep_status ep_side_warp(const ep_side *from, const double *partner, double *y, ep_error *err);
+
 // The side on `count` of its vertices: sample (count), owner (n) the sample nearest to each vertex.
 // No stiffness: such a side can be matched, not judged.
 ep_status ep_side_coarsen(const ep_side *side, int count, ep_side *out, int *sample, int *owner,
@@ -88,6 +98,7 @@ typedef struct ep_match_rule {
   double gamma;             // weight of positions
   double region_weight;     // weight of regions, 0 without
   double mark_weight;       // weight of landmarks, 0 without
+  double skin_weight;       // weight of being on the boundary
   bool refine;              // p is a map already: the last level only
   const unsigned char *use; // (regions) which take part, NULL: all
 } ep_match_rule;

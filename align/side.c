@@ -16,6 +16,7 @@ void ep_side_free(ep_side *side) {
   free(side->share);
   free(side->indicator);
   free(side->region);
+  free(side->skin);
   free(side->mark);
   free(side->mark_x);
   free(side->mark_near);
@@ -76,6 +77,14 @@ static void set_functions(ep_side *side) {
   for (size_t i = 0; i < (size_t)side->n * side->k; i++) side->mphi[i] /= volume;
 }
 
+static ep_status set_skin(ep_side *side, ep_error *err) {
+  int count, *triangle;
+  EP_TRY(ep_mesh_surface(side->shape->mesh, &count, &triangle, err));
+  for (int i = 0; i < 3 * count; i++) side->skin[triangle[i]] = 1;
+  free(triangle);
+  return EP_OK;
+}
+
 ep_status ep_side_make(const ep_shape *shape, int k, ep_side *out, ep_error *err) {
   memset(out, 0, sizeof *out);
   out->shape = shape;
@@ -88,10 +97,12 @@ ep_status ep_side_make(const ep_shape *shape, int k, ep_side *out, ep_error *err
   out->mphi = malloc(n * k * sizeof(double));
   out->share = malloc(n * sizeof(double));
   ep_status status = EP_OK;
-  if (!out->x || !out->phi || !out->mphi || !out->share)
+  out->skin = calloc(n, sizeof(double));
+  if (!out->x || !out->phi || !out->mphi || !out->share || !out->skin)
     status = no_memory(out, err);
   else
     status = ep_lb_stiffness(shape->mesh, &out->stiffness, err);
+  if (status == EP_OK) status = set_skin(out, err);
   if (status != EP_OK) {
     ep_side_free(out);
     return status;

@@ -281,7 +281,7 @@ void pair_of_bodies(const char *name, body which, int refine_from, placement pla
   for (int i = 0; i < from.nv; i++) place_to(u + 3 * i, out->truth + 3 * i);
   shape_from_mesh(&out->from, &from, functions);
   shape_from_mesh(&out->to, &to, functions);
-  free(u);
+  out->u = u;
   free(other);
 }
 
@@ -289,6 +289,7 @@ void pair_free(truth_pair *pair) {
   shape_free(&pair->from);
   shape_free(&pair->to);
   free(pair->truth);
+  free(pair->u);
   memset(pair, 0, sizeof *pair);
 }
 
@@ -324,16 +325,25 @@ double pair_error(const truth_pair *pair, const int *tet, const double *weight) 
   return sum / pair->from.mesh.nv / ep_mesh_diagonal(to);
 }
 
-ep_landmark pair_landmark(const truth_pair *pair, const double x[3]) {
+static ep_landmark pair_landmark_at(const truth_pair *pair, const double *points,
+                                    const double x[3]) {
   ep_landmark mark = {.from_vertex = 0, .to_vertex = -1};
   double least = HUGE_VAL;
   for (int i = 0; i < pair->from.mesh.nv; i++) {
     double d2 = 0;
-    for (int c = 0; c < 3; c++) d2 += pow(pair->from.mesh.x[3 * i + c] - x[c], 2);
+    for (int c = 0; c < 3; c++) d2 += pow(points[3 * i + c] - x[c], 2);
     if (d2 >= least) continue;
     least = d2;
     mark.from_vertex = i;
   }
   memcpy(mark.to, pair->truth + 3 * mark.from_vertex, sizeof mark.to);
   return mark;
+}
+
+ep_landmark pair_landmark(const truth_pair *pair, const double x[3]) {
+  return pair_landmark_at(pair, pair->from.mesh.x, x);
+}
+
+ep_landmark pair_landmark_of(const truth_pair *pair, const double u[3]) {
+  return pair_landmark_at(pair, pair->u, u);
 }

@@ -32,6 +32,7 @@ typedef struct truth_pair {
   const char *name;
   test_shape from, to;
   double *truth; // (from's vertices x 3): where each belongs in `to`
+  double *u;     // (from's vertices x 3): parameters
 } truth_pair;
 
 // truth = place_to(u of from's vertices).
@@ -43,7 +44,9 @@ void pair_move(truth_pair *pair, const double axis[3], double degrees, double sc
 // Mean distance of the map's points to the truth over the diagonal of `to`. tet, weight as in
 // ep_map.
 double pair_error(const truth_pair *pair, const int *tet, const double *weight);
-// The vertex of `from` whose parameters or position is nearest to x, as a landmark with its truth.
+// The vertex of `from` whose position (parameters) is nearest to x (u), as a landmark with its
+// truth.
 ep_landmark pair_landmark(const truth_pair *pair, const double x[3]);
+ep_landmark pair_landmark_of(const truth_pair *pair, const double u[3]);
 
 #endif

@@ -82,9 +82,14 @@ static double nearest(const truth_pair *pair, int *tet, double *weight) {
   return pair_error(pair, tet, weight);
 }
 
-// Six landmarks of a flyer: nose, wing tips, tail tips, fin.
-static const double FLYER_MARKS[6][3] = {{0.85, 0, 0},     {0.1, 0, 1.0},     {0.1, 0, -1.0},
-                                         {-0.75, 0, 0.36}, {-0.75, 0, -0.36}, {-0.9, 0.4, 0}};
+// Six landmarks of each body, in its parameters: corners of the bar; the flyer's nose, wing tips,
+// tail tips and fin; the beast's head, tail and feet.
+enum { MARKS = 6 };
+static const double BODY_MARKS[BODIES][MARKS][3] = {
+    [BODY_BAR] = {{0, 0, 0}, {6, 2, 2}, {0, 2, 2}, {6, 0, 0}, {3, 2, 1}, {3, 1, 2}},
+    [BODY_FLYER] =
+        {{12, 3, 7}, {6.5, 2.5, 14}, {6.5, 2.5, 0}, {1, 2.5, 10}, {1, 2.5, 4}, {0, 6, 7}},
+    [BODY_BEAST] = {{13, 6, 2}, {0, 4, 2}, {3, 0, 1}, {3, 0, 4}, {10, 0, 1}, {10, 0, 4}}};
 
 static void match(const truth_pair *pair, int landmarks, const ep_landmark *mark, ep_map *map) {
   ep_map_options o = ep_default_map_options();
@@ -99,7 +104,7 @@ static void match(const truth_pair *pair, int landmarks, const ep_landmark *mark
 
 static const char *const VERDICTS[3] = {"good", "doubtful", "bad"};
 
-static void run(truth_pair *pair, bool flyer) {
+static void run(truth_pair *pair, body which) {
   const size_t n = (size_t)pair->from.mesh.nv;
   int *tet = malloc(n * sizeof *tet);
   double *weight = malloc(4 * n * sizeof *weight);
@@ -113,9 +118,9 @@ static void run(truth_pair *pair, bool flyer) {
          pair->to.mesh.nv, 100 * e_near, 100 * e_zoom, 100 * pair_error(pair, map.tet, map.weight),
          VERDICTS[map.quality.verdict], map.quality.cycle, seconds);
   ep_map_free(&map);
-  if (flyer) {
+  {
     ep_landmark mark[6];
-    for (int m = 0; m < 6; m++) mark[m] = pair_landmark(pair, FLYER_MARKS[m]);
+    for (int m = 0; m < 6; m++) mark[m] = pair_landmark_of(pair, BODY_MARKS[which][m]);
     match(pair, 6, mark, &map);
     printf("%-24s %5s %5s  %8s %8s %8.2f  %-8s %5.3f  %s\n", "  with six landmarks", "", "", "", "",
            100 * pair_error(pair, map.tet, map.weight), VERDICTS[map.quality.verdict],
@@ -238,7 +243,7 @@ int main(int argc, char **argv) {
     if (!strstr(r->name, word)) continue;
     pair_of_bodies(r->name, r->which, r->refine_from, r->from, r->refine_to, r->to, FUNCTIONS,
                    &pair);
-    run(&pair, r->from == place_plane);
+    run(&pair, r->which);
     pair_free(&pair);
   }
   if (strstr("composed", word)) {
