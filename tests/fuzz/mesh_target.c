@@ -1,4 +1,6 @@
 // Mesh files: the first byte chooses the format, the rest is the file.
+#include <math.h>
+
 #include "mesh/io.h"
 #include "tests/fuzz/target.h"
 
@@ -14,6 +16,13 @@ static void check_mesh(const ep_mesh *m, const ep_mesh_findings *f) {
   }
   for (int e = 0; m->tet_material && e < m->nt; e++)
     must(m->tet_material[e] >= 0 && m->tet_material[e] < m->nmaterials, "materials");
+  for (int i = 0; i < m->ndata; i++) {
+    const ep_point_data *data = &m->data[i];
+    must(data->name && (data->components == 1) == (data->value != NULL), "scalars have values");
+    double sum = 0;
+    for (int k = 0; data->value && k < m->nv; k++) sum += data->value[k]; // a sanitizer looks
+    must(sum == sum || isnan(sum), "values");
+  }
   must(ep_mesh_volume(m) >= 0, "volume");
 }
 
