@@ -178,11 +178,32 @@ typedef struct ep_contact_def {
   double damping;   // of the normal motion [s]: pressure damping x stiffness x speed
 } ep_contact_def;
 
+// A force whose direction is fixed in the world, spread over vertices: f_i = w_i force, sum w = 1.
+typedef struct ep_pull {
+  double force[3];     // [N]
+  double at[3];        // sum w_i (X_i - X_0) [length]
+  const double *modes; // (r x 3) sum w_i U_a,i
+} ep_pull;
+
+// A potential of where the object is, besides obstacles: springs, fields, an engine's own contact.
+// frame: where a free object stands (the identity for a held one), q (r). Returns the energy; adds
+// its gradient to g (n) and a positive semidefinite Hessian to h (n x n row-major) unless NULL.
+// Unknowns: n = r for a held object; n = r + 6 for a free one: q, translation, rotation vector
+// about frame->c, both in world axes: dx_i = dc + dtheta x (x_i - c) + R U_i dq.
+typedef double (*ep_outer_potential)(void *user, const ep_state *state, const ep_frame *frame,
+                                     const double *q, double *g, double *h, int n);
+
 typedef struct ep_step_def {
-  int cookie;                    // set by ep_default_step; a def made otherwise is refused
-  ep_integrator integrator;      // EP_IMPLICIT_EULER
-  double dt;                     // [s]
-  const double *force;           // (r) generalised external force U^T f, or NULL
+  int cookie;               // set by ep_default_step; a def made otherwise is refused
+  ep_integrator integrator; // EP_IMPLICIT_EULER
+  double dt;                // [s]
+  const double *force;      // (r) generalised external force U^T f, or NULL; of a free object:
+  // forces that turn with it
+  double gravity[3];        // [m/s^2] free objects; of a held one it is in `force`
+  int pulls;                // forces fixed in the world, free objects only
+  const ep_pull *pull;      // (pulls)
+  ep_outer_potential outer; // a potential of the world acting on the object, or NULL
+  void *outer_user;
   double damping_mass;           // Rayleigh alpha [1/s]
   double damping_stiffness;      // Rayleigh beta [s], against K0
   double strength;               // example strength; 1: as stiff as the material itself; 0: none
@@ -233,7 +254,10 @@ typedef struct ep_step_report {
 // One implicit step: weights and target from the state's q, then the minimum of the incremental
 // potential with the target frozen. Writing q or velocity, or another integrator, between steps is
 // fine: the two-step formula and the acceleration then start anew. report may be NULL.
-// Errors: EP_ERR_ARGUMENT (def), EP_ERR_NUMERIC (no convergence, NaN): the state is unchanged.
+// A free object moves as a whole too: gravity, pulls and outer potentials change its momenta,
+// nothing else does (but damping_mass, a drag against the still world). The state's frame moves
+// with them. Errors: EP_ERR_ARGUMENT (def, or gravity and pulls of a held object), EP_ERR_NUMERIC
+// (no convergence, NaN): the state is unchanged.
 ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *report);
 
 // The example force of a step with the target of the last interpolation (ep_interpolate, ep_step)

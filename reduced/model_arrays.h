@@ -14,7 +14,8 @@
 
 #define EP_MODEL_SIZES(X)                                                                          \
   X(n)                                                                                             \
-  X(nt) X(r) X(m) X(k) X(regions) X(s) X(blocks) X(greens) X(cubic) X(cubic_float) X(rigid) X(contacts)       \
+  X(nt)                                                                                            \
+  X(r) X(m) X(k) X(regions) X(s) X(blocks) X(greens) X(cubic) X(cubic_float) X(rigid) X(contacts)  \
       X(nodes)
 
 // clang-format off

@@ -53,7 +53,7 @@ static const double tiny_strain = 1e-13, small_strain = 1e-9;
 // Hessian at state->x, factored. Where it is not positive definite: once more with projected
 // elements, then with growing shifts of the diagonal (a projected one can still be singular).
 static int factor_hessian(ep_state *state, ep_newton *newton) {
-  const int r = state->model->size.r;
+  const int r = newton->n;
   newton->energy(newton->user, state->x, NULL, state->h, 0);
   if (ep_cholesky(r, state->h, state->factor)) return 1;
   newton->projections++;
@@ -72,7 +72,7 @@ static int factor_hessian(ep_state *state, ep_newton *newton) {
 // Armijo along state->direction; leaves the new point, its gradient and energy. `noise`: energies
 // closer than this are equal to round-off, then the gradient decides. Returns the step, 0: none.
 static double line_search(ep_state *state, ep_newton *newton, double slope, double noise) {
-  const int r = state->model->size.r;
+  const int r = newton->n;
   double step = 1;
   for (int i = 0; i < MAX_BACKTRACKS; i++, step *= 0.5) {
     for (int a = 0; a < r; a++) state->trial[a] = state->x[a] + step * state->direction[a];
@@ -90,7 +90,7 @@ static double line_search(ep_state *state, ep_newton *newton, double slope, doub
 }
 
 ep_status ep_newton_minimise(ep_state *state, ep_newton *newton) {
-  const int r = state->model->size.r;
+  const int r = newton->n;
   newton->energy_now = newton->energy(newton->user, state->x, state->g, NULL, 0);
   newton->evaluations++;
   for (;;) {
@@ -112,6 +112,8 @@ ep_status ep_newton_minimise(ep_state *state, ep_newton *newton) {
                    1e-15 * sqrt(fabs(newton->energy_now) * state->energy_scale);
     double strain = state->strain_scale * sqrt(ep_dot(r, state->direction, state->direction));
     double step = line_search(state, newton, slope, noise);
+    if (step > 0 && newton->refresh)
+      newton->energy_now = newton->refresh(newton->user, state->x, state->g);
     if (strain <= (step > 0 ? tiny_strain : small_strain)) break; // nothing left but round-off
     if (step == 0) return EP_ERR_NUMERIC;
   }

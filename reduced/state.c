@@ -19,6 +19,7 @@ static size_t lay_out(const ep_model *model, char *memory, ep_state *state) {
   const size_t s = (size_t)model->size.s, width = 8 * (size_t)model->size.blocks;
   const size_t greens = (size_t)model->size.greens, contacts = (size_t)model->size.contacts;
   const size_t regions = (size_t)model->size.regions, sets = (size_t)ep_model_regions(model);
+  const size_t free = model->size.rigid ? r : 0, n = model->size.rigid ? r + 6 : r;
   const size_t examples = k > 0 && m > 0; // without descriptors their scratch is left out
   const size_t cubic_words =
       model->evaluator == EP_EVALUATE_CUBATURE

@@ -9,7 +9,8 @@
 #include "reduced/kernel.h"
 #include "reduced/region.h"
 
-// Arrays of a state: X(name, number of doubles). width = 8 ceil(r / 8), sets = ep_model_regions.
+// Arrays of a state: X(name, number of doubles). width = 8 ceil(r / 8), sets = ep_model_regions;
+// free = r where the object is free, else 0; n = r, or r + 6 unknowns where it is free.
 // clang-format off
 #define EP_STATE_ARRAYS(X)                                                                        \
   X(q, r)                  /* configuration and velocity */                                        \
@@ -28,13 +29,13 @@
   X(padded_f, width)                                                                              \
   X(padded_k, width * width)                                                                      \
   X(kernel_scratch, ep_kernel_scratch((int)(width / 8)))                                          \
-  X(x, r)                  /* Newton: point, gradient, direction, trial, Hessian, its factor */   \
-  X(g, r)                                                                                         \
-  X(direction, r)                                                                                 \
-  X(trial, r)                                                                                     \
-  X(trial_g, r)                                                                                   \
-  X(h, r * r)                                                                                     \
-  X(factor, r * r)                                                                                \
+  X(x, n)                  /* Newton: point, gradient, direction, trial, Hessian, its factor */   \
+  X(g, n)                                                                                         \
+  X(direction, n)                                                                                 \
+  X(trial, n)                                                                                     \
+  X(trial_g, n)                                                                                   \
+  X(h, n * n)                                                                                     \
+  X(factor, n * n)                                                                                \
   X(aside, r)              /* step: reduced/integrator.h's ahead and base */                       \
   X(base, r)                                                                                      \
   X(a, r)                  /* the motion so far: acceleration, the step before, and where the */  \
@@ -64,9 +65,22 @@
   X(green_h, greens ? r * r : 0)                                                                  \
   X(contact_start, contacts ? r : 0) /* contact: q at the step's start, where friction takes */   \
   X(contact_lag, contacts ? r : 0)   /* normal forces from, after free flight; rows of one */     \
-  X(contact_ahead, contacts ? r : 0) /* vertex; gradient of the last evaluation */                \
+  X(contact_ahead, contacts ? r : 0) /* vertex */                \
   X(contact_rows, contacts ? 6 * (r + 6) : 0)                                                     \
-  X(contact_g, contacts ? r : 0)
+  X(outer_g, n)            /* gradient of potentials outside the object */                        \
+  X(inner_g, free ? n : 0) /* free motion: gradient without what is frozen, and */                \
+  X(free_p, free)          /* reduced/free_step.h: momentum, unturned base and ahead at the */    \
+  X(free_base, free)       /* start; where it was frozen, force, origin of the damping; C, */      \
+  X(free_ahead, free)      /* softening; dS/dq, H, G */                                           \
+  X(free_at, free)                                                                                \
+  X(free_force, free)                                                                             \
+  X(free_drift, free)                                                                             \
+  X(free_scratch, free)                                                                           \
+  X(free_c, free * free)                                                                          \
+  X(free_n, free * free)                                                                          \
+  X(free_ds, 6 * free)                                                                            \
+  X(free_h, 3 * free)                                                                             \
+  X(free_g, 3 * free)
 // clang-format on
 
 // What contact keeps from step to step and within one (reduced/contact.c).
@@ -95,6 +109,9 @@ struct ep_state {
   ep_frame frame;   // free motion: reduced/frame.h; at the end of the last step
   double linear[3]; // momentum, angular momentum about the centre of mass; world axes
   double angular[3];
+  double linear_rate[3], angular_rate[3]; // of the last step, without contact (Newmark)
+  double c_before[3], linear_before[3], angular_before[3]; // at its beginning (BDF2)
+  int touched;                                             // something outside acted in it
 #define X(name, count) double *name;
   EP_STATE_ARRAYS(X)
 #undef X
@@ -155,7 +172,11 @@ typedef struct ep_newton {
   // Energy at x; gradient g and Hessian h unless NULL; project: positive semidefinite.
   double (*energy)(void *user, const double *x, double *g, double *h, int project);
   double (*residual)(void *user, const double *x, const double *g); // relative
+  // Terms that follow the iterate are brought up to date at x (which it may rewrite in other
+  // coordinates), the gradient with them: returns the energy. NULL: there are none.
+  double (*refresh)(void *user, double *x, double *g);
   void *user;
+  int n;                    // unknowns
   const double *cancelling; // size of the terms of the last energy, where they cancel; or NULL
   double tolerance;
   int max_iterations;

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "reduced/contact.h"
-#include "reduced/state.h"
+#include "reduced/step_run.h"
 
 enum { COOKIE = 0x45504f31 }; // "EPO1"
 
@@ -21,30 +21,25 @@ ep_step_def ep_default_step(void) {
                        .max_iterations = 50};
 }
 
+static int finite_pulls(const ep_step_def *d) {
+  double sum = d->gravity[0] + d->gravity[1] + d->gravity[2];
+  for (int i = 0; i < d->pulls; i++)
+    for (int a = 0; a < 3; a++) sum += d->pull[i].force[a] + d->pull[i].at[a];
+  return d->pulls >= 0 && isfinite(sum);
+}
+
 int ep_step_def_valid(const ep_step_def *d) {
   return d->cookie == COOKIE && d->dt > 0 && isfinite(d->dt) && d->damping_mass >= 0 &&
          isfinite(d->damping_mass) && d->damping_stiffness >= 0 && isfinite(d->damping_stiffness) &&
          d->strength >= 0 && isfinite(d->strength) && d->relief >= 0 && d->relief <= 1 &&
-         d->tolerance > 0 && d->target_tolerance > 0 && d->max_iterations > 0 &&
+         d->tolerance > 0 && d->target_tolerance > 0 && d->max_iterations > 0 && finite_pulls(d) &&
          ep_contact_def_valid(d) && ep_green_valid(&d->green) &&
          ep_integrator_name(d->integrator) != NULL &&
          (d->example_force == EP_EXAMPLE_ENERGY || d->example_force == EP_EXAMPLE_LINEAR);
 }
 
-typedef struct step {
-  ep_state *state;
-  const ep_step_def *def;
-  int examples;              // an example force acts
-  const double *kept_weight; // (s) of the material where relief takes a part of it; NULL: all alike
-  int contact;               // there are obstacles
-  double rate, inertia;      // of the integrator
-  double internal;           // last evaluation: |force| inside, energies
-  double elastic, pull, strains;
-  double cancelling; // energy of terms that cancel: round-off counts from there
-} step;
-
 // y = scale * K0 (x - origin) added to g; returns (x - origin)^T K0 (x - origin). origin NULL: 0.
-static double add_k0(const step *s, double scale, const double *x, const double *origin,
+static double add_k0(const ep_step_run *s, double scale, const double *x, const double *origin,
                      double *g) {
   const int r = s->state->model->size.r;
   const double *k0 = s->state->model->k0;
@@ -59,7 +54,7 @@ static double add_k0(const step *s, double scale, const double *x, const double 
 }
 
 // Elastic and example energy with gradient and Hessian.
-static double inner_energy(step *s, const double *x, double *g, double *h, int project) {
+static double inner_energy(ep_step_run *s, const double *x, double *g, double *h, int project) {
   ep_state *state = s->state;
   const ep_step_def *def = s->def;
   const int as_energy = s->examples && def->example_force == EP_EXAMPLE_ENERGY;
@@ -88,47 +83,79 @@ static double inner_energy(step *s, const double *x, double *g, double *h, int p
   return s->elastic + s->pull + s->strains;
 }
 
-static double energy(void *user, const double *x, double *g, double *h, int project) {
-  step *s = user;
+// What follows the time step: inertia, damping, external forces; sum and gradient and Hessian (r x
+// r) go on from there.
+static double moving_energy(ep_step_run *s, double sum, const double *x, double *g, double *h) {
   ep_state *state = s->state;
   const ep_step_def *def = s->def;
   const int r = state->model->size.r;
   const double inertia = s->inertia, drag = def->damping_mass * s->rate;
-  double sum = inner_energy(s, x, g, h, project);
-  if (g) s->internal = fmax(s->internal, sqrt(ep_dot(r, g, g)));
   const double viscous = def->damping_stiffness * s->rate;
-  if (viscous > 0) sum += 0.5 * viscous * add_k0(s, viscous, x, state->base, g);
+  const double *origin = s->free ? state->free_drift : state->base;
+  if (viscous > 0) sum += 0.5 * viscous * add_k0(s, viscous, x, origin, g);
   for (int a = 0; a < r; a++) {
     double ahead = x[a] - state->aside[a], moved = x[a] - state->base[a];
     double force = def->force ? def->force[a] : 0;
     sum += 0.5 * (inertia * ahead * ahead + drag * moved * moved) - force * x[a];
     if (g) g[a] += inertia * ahead + drag * moved - force;
   }
-  if (s->contact) sum += ep_contact_energy(state, def, NULL, x, g, h, r);
-  if (!h) return sum;
   const int linear = s->examples && def->example_force == EP_EXAMPLE_LINEAR;
   const double stiff = viscous + (linear ? def->strength : 0);
-  for (int i = 0; stiff > 0 && i < r * r; i++) h[i] += stiff * state->model->k0[i];
-  for (int a = 0; a < r; a++) h[(r + 1) * a] += inertia + drag;
-  return sum;
+  for (int i = 0; h && stiff > 0 && i < r * r; i++) h[i] += stiff * state->model->k0[i];
+  for (int a = 0; h && a < r; a++) h[(r + 1) * a] += inertia + drag;
+  return s->free ? sum + ep_free_energy(&s->motion, x, s->joint, g, h) : sum;
+}
+
+double ep_step_energy(void *user, const double *x, double *g, double *h, int project) {
+  ep_step_run *s = user;
+  ep_state *state = s->state;
+  const int r = state->model->size.r;
+  const size_t bytes = (size_t)r * sizeof *x;
+  double sum = s->inside = inner_energy(s, x, g, h, project);
+  if (g) s->internal = fmax(s->internal, sqrt(ep_dot(r, g, g)));
+  if (s->free && g) memcpy(state->inner_g, g, bytes);
+  sum = moving_energy(s, sum, x, g, h);
+  if (s->joint) return sum + ep_joint_energy(s, x, g, h);
+  return s->free || !(s->contact || s->outer) ? sum
+                                              : sum + ep_outside_energy(s, &state->frame, x, g, h);
+}
+
+// After a step of Newton: the frame goes to the iterate, inertial forces with it.
+static double refresh(void *user, double *x, double *g) {
+  ep_step_run *s = user;
+  ep_state *state = s->state;
+  const int r = state->model->size.r;
+  if (s->joint) ep_joint_take_iterate(s, x);
+  ep_free_freeze(&s->motion, x, s->joint ? s->iterate.R : NULL);
+  memcpy(g, state->inner_g, (size_t)(s->joint ? r + 6 : r) * sizeof *g);
+  const double sum = moving_energy(s, s->inside, x, g, NULL);
+  return s->joint ? sum + ep_joint_rigid(s, x, g, NULL) : sum;
 }
 
 // |gradient| over the forces in play; never less than what a strain of 1e-8 makes.
 static double residual(void *user, const double *x, const double *g) {
-  step *s = user;
+  ep_step_run *s = user;
   const ep_state *state = s->state;
   const int r = state->model->size.r;
   double ahead = 0, force = s->def->force ? sqrt(ep_dot(r, s->def->force, s->def->force)) : 0;
   for (int a = 0; a < r; a++) ahead += (x[a] - state->aside[a]) * (x[a] - state->aside[a]);
+  if (s->joint) ahead += ep_joint_ahead(s, x);
   double scale = force + s->internal + sqrt(ahead) * s->inertia + 1e-8 * state->force_scale;
-  return sqrt(ep_dot(r, g, g)) / scale;
+  const int n = s->joint ? r + 6 : r;
+  return sqrt(ep_dot(n, g, g)) / scale;
 }
 
 // Acceleration from the equation of motion, a = f - dW/dq - D v, where no step before left it.
-static void start_acceleration(step *s) {
+static void start_acceleration(ep_step_run *s) {
   ep_state *state = s->state;
   const ep_step_def *def = s->def;
   inner_energy(s, state->q, state->g, NULL, 0);
+  if (s->outer) {
+    const int n = state->model->size.r + (s->free ? 6 : 0);
+    memset(state->outer_g, 0, (size_t)n * sizeof *state->outer_g);
+    def->outer(def->outer_user, state, &state->frame, state->q, state->outer_g, NULL, n);
+    for (int a = 0; a < state->model->size.r; a++) state->g[a] += state->outer_g[a];
+  }
   if (def->damping_stiffness > 0) add_k0(s, def->damping_stiffness, state->v, NULL, state->g);
   for (int a = 0; a < state->model->size.r; a++)
     state->a[a] = (def->force ? def->force[a] : 0) - state->g[a] - def->damping_mass * state->v[a];
@@ -136,13 +163,18 @@ static void start_acceleration(step *s) {
 
 // What the integrator makes of the motion so far. Where the caller wrote q or v since the last
 // step, there is no motion before.
-static void predict(step *s) {
+static void predict(ep_step_run *s) {
   ep_state *state = s->state;
   const size_t r = (size_t)state->model->size.r;
   if (memcmp(state->q, state->end_q, r * sizeof *state->q) != 0 ||
       memcmp(state->v, state->end_v, r * sizeof *state->v) != 0)
     state->dt_before = 0;
   if (s->def->integrator == EP_NEWMARK && state->dt_before == 0) start_acceleration(s);
+  if (s->free) {
+    ep_free_begin(&s->motion, state, s->def);
+    s->rate = s->motion.rate, s->inertia = s->motion.inertia;
+    return;
+  }
   const ep_motion motion = {.q = state->q,
                             .v = state->v,
                             .a = state->a,
@@ -153,35 +185,63 @@ static void predict(step *s) {
                         &s->rate, &s->inertia);
 }
 
-// The acceleration Newmark's formula goes on with is free of contact (reduced/contact.c).
-static void take_contact_off(step *s) {
+// Starts contact from the step's start and free flight (a free object is frozen there).
+static void begin_contact(ep_step_run *s) {
   ep_state *state = s->state;
-  const int r = state->model->size.r;
-  memset(state->contact_g, 0, (size_t)r * sizeof *state->contact_g);
-  ep_contact_energy(state, s->def, NULL, state->x, state->contact_g, NULL, r);
-  for (int a = 0; a < r; a++) state->a[a] += state->contact_g[a];
+  ep_frame ahead;
+  if (s->free) ep_joint_flight(s, &ahead);
+  ep_contact_begin(state, s->def, s->free ? &state->frame : NULL, s->free ? &ahead : NULL, state->q,
+                   state->aside);
+}
+
+// Start at the free flight or at rest, whichever has the lower potential.
+static void choose_start(ep_step_run *s) {
+  ep_state *state = s->state;
+  const size_t bytes = (size_t)state->model->size.r * sizeof(double);
+  double still = ep_step_energy(s, state->q, NULL, NULL, 0);
+  double flight = ep_step_energy(s, state->aside, NULL, NULL, 0);
+  memcpy(state->x, flight < still ? state->aside : state->q, bytes);
+  if (s->free) ep_free_freeze(&s->motion, state->x, NULL);
 }
 
 // Minimise; again where friction or the depth ask for it.
-static ep_status minimise(step *s, ep_newton *newton) {
+static ep_status minimise_contact(ep_step_run *s, ep_newton *newton) {
   for (;;) {
     const ep_status status = ep_newton_minimise(s->state, newton);
     if (status != EP_OK || !s->contact) return status;
-    if (!ep_contact_again(s->state, s->def, NULL, s->state->x)) return EP_OK;
+    if (!ep_contact_again(s->state, s->def, s->free ? &s->iterate : NULL, s->state->x))
+      return EP_OK;
     newton->max_iterations = newton->iterations + s->def->max_iterations;
   }
 }
 
-// Start at the free flight or at rest, whichever has the lower potential.
-static void choose_start(step *s) {
+// A free object first flies free of the world, unless something outside acted in the last step.
+static ep_status minimise(ep_step_run *s, ep_newton *newton) {
   ep_state *state = s->state;
-  const size_t bytes = (size_t)state->model->size.r * sizeof(double);
-  double still = energy(s, state->q, NULL, NULL, 0);
-  double flight = energy(s, state->aside, NULL, NULL, 0);
-  memcpy(state->x, flight < still ? state->aside : state->q, bytes);
+  if (!s->free) return minimise_contact(s, newton);
+  if (!s->motion.sound) return EP_ERR_NUMERIC;
+  const int outside = s->contact || s->outer;
+  newton->refresh = refresh;
+  if (!outside || !state->touched) {
+    const ep_status status = ep_newton_minimise(state, newton);
+    if (status != EP_OK || !outside || !ep_joint_needed(s)) return status;
+    newton->max_iterations += newton->iterations;
+  }
+  ep_joint_begin(s);
+  newton->n += 6;
+  return minimise_contact(s, newton);
 }
 
-static void finish(step *s) {
+// The acceleration Newmark's formula goes on with is free of contact (reduced/contact.c); outer_g
+// receives what is to be added to it.
+static void contact_gradient(ep_step_run *s) {
+  ep_state *state = s->state;
+  const int r = state->model->size.r;
+  memset(state->outer_g, 0, (size_t)r * sizeof *state->outer_g);
+  ep_contact_energy(state, s->def, NULL, state->x, state->outer_g, NULL, r);
+}
+
+static void finish_held(ep_step_run *s) {
   ep_state *state = s->state;
   for (int a = 0; a < state->model->size.r; a++) {
     state->q_before[a] = state->q[a];
@@ -190,7 +250,27 @@ static void finish(step *s) {
     state->v[a] = state->end_v[a] = s->rate * (state->x[a] - state->base[a]);
     state->q[a] = state->end_q[a] = state->x[a];
   }
-  if (s->contact && s->def->integrator == EP_NEWMARK) take_contact_off(s);
+}
+
+static void finish(ep_step_run *s, ep_contact_report *contact) {
+  ep_state *state = s->state;
+  const ep_frame *frame = s->free ? (s->joint ? &s->iterate : &state->frame) : NULL;
+  const int newmark = s->def->integrator == EP_NEWMARK;
+  int touched = 0;
+  if (s->joint)
+    touched = ep_joint_finish(s);
+  else if (s->contact && !s->free && newmark)
+    contact_gradient(s);
+  if (s->contact && (!s->free || s->joint))
+    ep_contact_measure(state, s->def, frame, state->x, contact);
+  if (s->contact) ep_contact_commit(state, contact);
+  if (s->free)
+    ep_free_finish(&s->motion, state->x, s->joint ? &s->iterate : NULL);
+  else
+    finish_held(s);
+  if (newmark && s->contact && (!s->free || s->joint))
+    for (int a = 0; a < state->model->size.r; a++) state->a[a] += state->outer_g[a];
+  state->touched = touched;
   state->dt_before = s->def->dt;
   if (s->examples) ep_commit_target(state);
 }
@@ -217,51 +297,70 @@ static const double *relieve_regions(ep_state *state, const ep_step_def *def) {
   return state->kept_weight;
 }
 
+static void set_report(const ep_step_run *s, const ep_newton *newton, ep_step_report *report) {
+  report->newton_iterations = newton->iterations;
+  report->line_search_steps = newton->line_search_steps;
+  report->projections = newton->projections;
+  report->residual = newton->residual_now;
+  report->elastic_energy = s->elastic;
+  report->example_energy = s->pull;
+  report->green_energy = s->strains;
+}
+
+// Gravity and pulls of a held object are in its `force`.
+static int suits_model(const ep_model *m, const ep_step_def *def) {
+  const double *g = def->gravity;
+  return suits_regions(m, def) &&
+         (m->size.rigid || (def->pulls == 0 && g[0] == 0 && g[1] == 0 && g[2] == 0));
+}
+
+static ep_status find_target(ep_step_run *s, ep_step_report *report) {
+  if (!s->examples) return EP_OK;
+  const ep_status status = ep_find_target(s->state, s->def, &report->target);
+  if (status == EP_OK && s->state->model->size.regions && s->def->relief > 0)
+    s->kept_weight = relieve_regions(s->state, s->def);
+  return status;
+}
+
 ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *report) {
   ep_step_report unused;
+  const ep_model_sizes *size = &state->model->size;
   if (!report) report = &unused;
   *report = (ep_step_report){0};
-  if (!ep_step_def_valid(def) || !suits_regions(state->model, def)) return EP_ERR_ARGUMENT;
-  step s = {.state = state, .def = def, .examples = state->model->size.k > 0 && def->strength > 0};
-  s.examples = s.examples && state->model->size.m > 0; // else only their strains are known
-  s.contact = ep_contact_acts(state, def);
-  if (s.examples) {
-    ep_status status = ep_find_target(state, def, &report->target);
-    if (status != EP_OK) return status;
-  }
-  if (s.examples && state->model->size.regions && def->relief > 0)
-    s.kept_weight = relieve_regions(state, def);
-  ep_newton newton = {.energy = energy,
+  if (!ep_step_def_valid(def) || !suits_model(state->model, def)) return EP_ERR_ARGUMENT;
+  // Without m only the examples' strains are known.
+  ep_step_run s = {.state = state,
+                   .def = def,
+                   .examples = size->k > 0 && size->m > 0 && def->strength > 0,
+                   .contact = ep_contact_acts(state, def),
+                   .outer = def->outer != NULL,
+                   .free = size->rigid};
+  ep_newton newton = {.energy = ep_step_energy,
                       .residual = residual,
                       .user = &s,
+                      .n = size->r,
                       .cancelling = &s.cancelling,
                       .tolerance = fmax(def->tolerance, state->force_noise),
                       .max_iterations = def->max_iterations};
-  predict(&s);
-  if (s.contact) ep_contact_begin(state, def, NULL, NULL, state->q, state->aside);
-  choose_start(&s);
-  ep_status status = minimise(&s, &newton);
-  report->newton_iterations = newton.iterations;
-  report->line_search_steps = newton.line_search_steps;
-  report->projections = newton.projections;
-  report->residual = newton.residual_now;
+  ep_status status = find_target(&s, report);
   if (status != EP_OK) return status;
-  if (s.contact) {
-    ep_contact_measure(state, def, NULL, state->x, &report->contact);
-    ep_contact_commit(state, &report->contact);
-  }
-  finish(&s);
-  report->elastic_energy = s.elastic;
-  report->example_energy = s.pull;
-  report->green_energy = s.strains;
-  report->kinetic_energy = 0.5 * ep_dot(state->model->size.r, state->v, state->v);
+  predict(&s);
+  if (s.free && s.motion.sound) ep_free_freeze(&s.motion, state->q, NULL);
+  if (s.contact) begin_contact(&s);
+  choose_start(&s);
+  status = minimise(&s, &newton);
+  set_report(&s, &newton, report);
+  if (status != EP_OK) return status;
+  finish(&s, &report->contact);
+  report->kinetic_energy =
+      s.free ? ep_free_kinetic(state) : 0.5 * ep_dot(size->r, state->v, state->v);
   return EP_OK;
 }
 
 double ep_example_force_energy(ep_state *state, const ep_step_def *def, const double *q, double *f,
                                double *h, int project) {
   const int r = state->model->size.r;
-  const step s = {.state = state, .def = def};
+  const ep_step_run s = {.state = state, .def = def};
   if (f) memset(f, 0, (size_t)r * sizeof *f);
   if (h) memset(h, 0, (size_t)(r * r) * sizeof *h);
   if (state->model->size.k == 0 || state->model->size.m == 0 || def->strength == 0) return 0;

@@ -81,6 +81,7 @@ ep_status ep_target_newton(void *user, ep_state *state, const double *w, double 
   ep_newton newton = {.energy = energy,
                       .residual = residual,
                       .user = &it,
+                      .n = state->model->size.r,
                       .tolerance = tolerance,
                       .max_iterations = 100};
   memcpy(state->x, q, bytes);

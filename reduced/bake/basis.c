@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "linalg/dense.h"
+#include "reduced/bake/inertia.h"
 #include "reduced/bake/vectors.h"
 
 // Relative mass norm left of an example after the earlier ones are taken out, below which it adds
@@ -22,6 +23,7 @@ typedef struct builder {
   size_t n3;
   ep_basis *basis;
   double *mu;        // (r x 3n) M times each row of basis->u
+  double *rigid;     // (12 x 3n) rigid modes and M times them, where nothing is held; else NULL
   int filled;        // rows done
   int count;         // candidates
   double *candidate; // (count x 3n)
@@ -36,12 +38,17 @@ static void mass_times(const builder *b, const double *x, double *y) {
 }
 
 // Take the rows done out of v, twice: once loses orthogonality when little is left (Kahan).
+// Rigid modes too: a free object moves as a whole by its frame alone.
 static void deflate(const builder *b, double *v) {
-  for (int pass = 0; pass < 2; pass++)
+  for (int pass = 0; pass < 2; pass++) {
+    for (int k = 0; b->rigid && k < 6; k++)
+      ep_axpy(b->n3, -ep_dot(b->n3, row_of(b->rigid, b->n3, 6 + k), v), row_of(b->rigid, b->n3, k),
+              v);
     for (int a = 0; a < b->filled; a++) {
       const double part = ep_dot(b->n3, row_of(b->mu, b->n3, a), v);
       ep_axpy(b->n3, -part, row_of(b->basis->u, b->n3, a), v);
     }
+  }
 }
 
 // |v|_M, with M v left in the next row of mu.
@@ -247,7 +254,11 @@ static ep_status allocate(builder *b, ep_error *err) {
   b->mu = malloc((r + 1) * b->n3 * sizeof *b->mu);
   if (!basis->u || !basis->stiffness || !basis->example_q || !basis->example_residual || !b->mu)
     return ep_fail(err, EP_ERR_MEMORY, "no memory for %d basis vectors", basis->r);
-  return ep_fem_scalar_mass(b->fem, &b->mass, err);
+  EP_TRY(ep_fem_scalar_mass(b->fem, &b->mass, err));
+  if (!ep_fem_is_free(b->fem)) return EP_OK;
+  b->rigid = malloc(12 * b->n3 * sizeof *b->rigid);
+  if (!b->rigid) return ep_fail(err, EP_ERR_MEMORY, "no memory for the rigid modes");
+  return ep_rigid_modes(b->fem->mesh, &b->mass, b->rigid, b->rigid + 6 * b->n3, err);
 }
 
 static ep_status build(builder *b, const ep_modes *modes, const double *poses, int npaths,
@@ -278,6 +289,7 @@ ep_status ep_basis_build(const ep_fem *fem, const ep_modes *modes, int examples,
   ep_status status = build(&b, modes, poses, npaths, paths, log, err);
   ep_csr_free(&b.mass);
   free(b.mu);
+  free(b.rigid);
   free(b.candidate);
   if (status != EP_OK) ep_basis_free(out);
   return status;

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "reduced/bake/inertia.h"
 #include "reduced/reference.h"
 
 // The arrays while they are written; the model itself holds pointers to const.
@@ -307,6 +308,17 @@ static void fill_contact(builder *b) {
   b->a.contact_scale[0] = contact_scale(b->parts->fem);
 }
 
+static ep_status fill_inertia(builder *b, ep_error *err) {
+  const ep_fem *fem = b->parts->fem;
+  ep_csr mass = {0};
+  EP_TRY(ep_fem_scalar_mass(fem, &mass, err));
+  const ep_status status =
+      ep_inertia_sums(fem->mesh, &mass, b->size.r, b->a.u, b->a.rigid_mass, b->a.rigid_origin,
+                      b->a.rigid_s0, b->a.rigid_s1, b->a.rigid_s2, b->a.rigid_h, err);
+  ep_csr_free(&mass);
+  return status;
+}
+
 static int cubic_size(const ep_model_parts *p, ep_precision precision) {
   return p->cubic && p->precision == precision ? (int)ep_cubic_stream_size(p->basis->r, precision)
                                                : 0;
@@ -329,7 +341,8 @@ static ep_model_sizes sizes_of(const ep_model_parts *p) {
                           .cubic = cubic_size(p, EP_DOUBLE),
                           .cubic_float = cubic_size(p, EP_FLOAT),
                           .contacts = p->contact ? p->contact->contacts : 0,
-                          .nodes = p->contact ? p->contact->nodes : 0};
+                          .nodes = p->contact ? p->contact->nodes : 0,
+                          .rigid = ep_fem_is_free(p->fem)};
 }
 
 ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_error *err) {
@@ -344,6 +357,7 @@ ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_e
   EP_TRY_GOTO(status, build_cubature(&b, err), fail);
   fill_green(&b);
   fill_contact(&b);
+  if (b.size.rigid) EP_TRY_GOTO(status, fill_inertia(&b, err), fail);
   if (parts->cubic) EP_TRY_GOTO(status, fill_cubic(&b, err), fail);
   out->model.size = b.size;
   out->model.material = parts->fem->model;

@@ -6,6 +6,7 @@
 
 #include "reduced/bake/basis.h"
 #include "reduced/bake/fem_assembly.h"
+#include "reduced/bake/inertia.h"
 #include "reduced/bake/vectors.h"
 
 static const double PROXIMAL = 1e-8;  // of the stiffness at rest: see paths.h
@@ -254,8 +255,8 @@ static ep_status one_sample(const ep_fem *fem, workspace *w, int i, int samples,
   return EP_OK;
 }
 
-ep_status ep_path_samples(const ep_fem *fem, const double *pose, int samples, ep_log *log,
-                          double *out, ep_error *err) {
+static ep_status held_samples(const ep_fem *fem, const double *pose, int samples, ep_log *log,
+                              double *out, ep_error *err) {
   const size_t n3 = 3 * (size_t)fem->mesh->nv;
   workspace w = {0};
   ep_status status = EP_OK;
@@ -273,4 +274,29 @@ ep_status ep_path_samples(const ep_fem *fem, const double *pose, int samples, ep
 done:
   workspace_free(&w);
   return status;
+}
+
+// Nothing held: strains do not see rigid motions; supports take them out, and each sample is fitted
+// to rest again.
+static ep_status free_samples(const ep_fem *fem, const double *pose, int samples, ep_log *log,
+                              double *out, ep_error *err) {
+  const size_t n3 = 3 * (size_t)fem->mesh->nv;
+  ep_csr mass = {0};
+  ep_fem supported = *fem;
+  supported.held = calloc(n3, 1);
+  if (!supported.held) return ep_fail(err, EP_ERR_MEMORY, "no memory for an example's path");
+  ep_rigid_supports(fem->mesh, supported.held);
+  ep_status status = held_samples(&supported, pose, samples, log, out, err);
+  free(supported.held);
+  if (status == EP_OK) status = ep_fem_scalar_mass(fem, &mass, err);
+  for (int i = 0; i < samples && status == EP_OK; i++)
+    status = ep_rigid_fit(fem->mesh, &mass, out + (size_t)i * n3, err);
+  ep_csr_free(&mass);
+  return status;
+}
+
+ep_status ep_path_samples(const ep_fem *fem, const double *pose, int samples, ep_log *log,
+                          double *out, ep_error *err) {
+  return ep_fem_is_free(fem) ? free_samples(fem, pose, samples, log, out, err)
+                             : held_samples(fem, pose, samples, log, out, err);
 }
