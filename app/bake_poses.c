@@ -6,6 +6,7 @@
 
 #include "app/bake.h"
 #include "linalg/dense.h"
+#include "reduced/bake/inertia.h"
 
 // A pose whose fixed vertices stray further than this share of the diagonal does not hold still
 // what the scene holds: beyond the first figure a warning, beyond the second an error.
@@ -46,6 +47,7 @@ static ep_status bring_back(const ep_mesh *mesh, int count, const int *list, dou
 // How far the fixed vertices are off rest in displacement u: rms over the diagonal.
 static double shift_of(const ep_shapes *shapes, const double *u) {
   double sum = 0;
+  if (!shapes->nfixed) return 0;
   for (int i = 0; i < shapes->nfixed; i++)
     for (int a = 0; a < 3; a++) {
       const double d = u[3 * (size_t)shapes->fixed[i] + (size_t)a];
@@ -151,10 +153,12 @@ static ep_status transfer(ep_bake *bake, const ep_pose_source *example, double *
   return status;
 }
 
-// u becomes R (x + u) + t - x, with the fixed vertices as near to rest as a rigid motion can.
+// u becomes R (x + u) + t - x, with the fixed vertices as near to rest as a rigid motion can; a
+// free object is fitted at the end, by its mass (fit_free).
 static ep_status hold_rigidly(const ep_shapes *shapes, double *u, ep_error *err) {
   const ep_mesh *mesh = &shapes->shape[0].mesh;
   const size_t n3 = 3 * (size_t)mesh->nv;
+  if (!shapes->nfixed) return EP_OK;
   for (size_t i = 0; i < n3; i++) u[i] += mesh->x[i];
   EP_TRY(bring_back(mesh, shapes->nfixed, shapes->fixed, u, err));
   for (size_t i = 0; i < n3; i++) u[i] -= mesh->x[i];
@@ -336,8 +340,10 @@ static ep_status compute_poses(ep_bake *bake, ep_bake_step *step, ep_error *err)
   EP_TRY(ep_bake_compute(bake, step, err));
   bake->poses = calloc(k * 3 * n, sizeof *bake->poses);
   bake->quality = calloc(k, sizeof *bake->quality);
-  unsigned char *held = calloc(n, 1);
-  ep_status status = bake->poses && bake->quality && held ? EP_OK : no_memory(err);
+  // a free object has no such marks at all: pose and repair tell by that
+  unsigned char *held = bake->shapes->nfixed ? calloc(n, 1) : NULL;
+  const bool marked = held || !bake->shapes->nfixed;
+  ep_status status = bake->poses && bake->quality && marked ? EP_OK : no_memory(err);
   for (int i = 0; status == EP_OK && i < bake->shapes->nfixed; i++)
     held[bake->shapes->fixed[i]] = 1;
   if (status == EP_OK) ep_progress_begin(bake->log, "example poses", (long)k);
@@ -369,6 +375,20 @@ static bool take_poses(ep_bake *bake, const ep_bake_step *step) {
   return true;
 }
 
+// Poses of a free object, moved as near to rest as rigid motions can in the mass norm: only then
+// are they in the span of a basis free of rigid modes. Not in the cache: densities play a part.
+static ep_status fit_free(ep_bake *bake, ep_error *err) {
+  const ep_mesh *mesh = &bake->shapes->shape[0].mesh;
+  ep_csr mass = {0};
+  EP_TRY(ep_bake_fem(bake, err));
+  EP_TRY(ep_fem_scalar_mass(&bake->fem, &mass, err));
+  ep_status status = EP_OK;
+  for (int i = 0; i < bake->shapes->examples && status == EP_OK; i++)
+    status = ep_rigid_fit(mesh, &mass, bake->poses + (size_t)i * 3 * (size_t)mesh->nv, err);
+  ep_csr_free(&mass);
+  return status;
+}
+
 ep_status ep_bake_poses(ep_bake *bake, ep_error *err) {
   ep_stage *stage = ep_plan_find(bake->plan, EP_STAGE_POSES);
   if (bake->poses || !stage->runs) return EP_OK;
@@ -378,5 +398,6 @@ ep_status ep_bake_poses(ep_bake *bake, ep_error *err) {
   if (step.found && !take_poses(bake, &step)) ep_bake_reject(bake, &step);
   if (!step.found) status = compute_poses(bake, &step, err);
   ep_bake_end(&step);
+  if (status == EP_OK && !bake->shapes->nfixed) status = fit_free(bake, err);
   return ep_bake_status(stage, status, err);
 }

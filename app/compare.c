@@ -370,6 +370,11 @@ ep_status ep_command_compare(const ep_cli *cli, ep_error *err) {
                    "compare does not know examples of a region on the LB path yet; leave "
                    "families[].region out, or use --set examples.path=green");
   }
+  if (session.shapes.nfixed == 0) {
+    ep_session_close(&session);
+    return ep_fail(err, EP_ERR_UNSUPPORTED,
+                   "compare does not follow free objects yet; compare the object held by `fixed`");
+  }
   const ep_mesh *mesh = &session.shapes.shape[0].mesh;
   sweep w = {.cli = cli,
              .session = &session,

@@ -27,8 +27,9 @@ static int frame_rows(const ep_scene *scene, const ep_record *record, int *row) 
 }
 
 static ep_status write_frame(const char *path, const ep_mesh *mesh, const ep_model *model,
-                             const double *q, double *x, double *u, ep_error *err) {
-  ep_positions(model, q, x);
+                             const ep_record *record, int row, double *x, double *u,
+                             ep_error *err) {
+  ep_record_positions(model, record, row, x);
   for (size_t i = 0; i < 3 * (size_t)mesh->nv; i++) u[i] = x[i] - mesh->x[i];
   const ep_field field = {"displacement", 3, u};
   return ep_mesh_write_vtu(path, mesh, x, 1, &field, 0, NULL, err);
@@ -37,7 +38,7 @@ static ep_status write_frame(const char *path, const ep_mesh *mesh, const ep_mod
 static ep_status write_vtu(const char *folder, const ep_mesh *mesh, const ep_model *model,
                            const ep_record *record, int frames, const int *row, ep_log *log,
                            ep_error *err) {
-  const size_t r = (size_t)model->size.r, count = (size_t)frames;
+  const size_t count = (size_t)frames;
   char path[EP_PATH_MAX];
   char(*name)[PATH_SHORT] = calloc(count, sizeof *name);
   const char **names = calloc(count, sizeof *names);
@@ -52,8 +53,7 @@ static ep_status write_vtu(const char *folder, const ep_mesh *mesh, const ep_mod
     time[i] = record->time[row[i]];
     status = ep_path_join(folder, name[i], path, err);
     if (status == EP_OK)
-      status = write_frame(path, mesh, model, record->q + (size_t)row[i] * r, x,
-                           x + 3 * (size_t)mesh->nv, err);
+      status = write_frame(path, mesh, model, record, row[i], x, x + 3 * (size_t)mesh->nv, err);
     ep_progress(log, i + 1);
   }
   ep_progress_end(log);
@@ -70,9 +70,10 @@ static ep_status write_vtu(const char *folder, const ep_mesh *mesh, const ep_mod
 static void bounds_of_run(const ep_mesh *mesh, const ep_model *model, const ep_record *record,
                           double *x, double low[3], double high[3]) {
   const int stride = record->rows / 16 + 1;
-  ep_mesh_bounds(mesh, low, high);
+  if (!record->frame) ep_mesh_bounds(mesh, low, high);
+  for (int a = 0; record->frame && a < 3; a++) low[a] = high[a] = record->frame[0].c[a];
   for (int row = 0; row < record->rows; row += stride) {
-    ep_positions(model, record->q + (size_t)row * (size_t)model->size.r, x);
+    ep_record_positions(model, record, row, x);
     for (int i = 0; i < 3 * mesh->nv; i++) {
       low[i % 3] = fmin(low[i % 3], x[i]);
       high[i % 3] = fmax(high[i % 3], x[i]);
@@ -151,12 +152,33 @@ static ep_status make_gltf_solids(const ep_scene *scene, const ep_solids *solids
   return EP_OK;
 }
 
+// The moving frame as the pose of the node, with rest positions about the centre of mass: they take
+// the first (n x 3) of *motion, poses follow; malloc'd.
+static ep_status take_motion(ep_gltf_animation *a, const ep_model *model, const ep_record *record,
+                             const int *row, double **motion, ep_error *err) {
+  const size_t n3 = 3 * (size_t)a->n, frames = (size_t)a->frames;
+  *motion = NULL;
+  if (!record->frame) return EP_OK;
+  *motion = malloc((n3 + 12 * frames) * sizeof **motion);
+  if (!*motion) return no_memory(err);
+  double *pose = *motion + n3;
+  for (size_t i = 0; i < n3; i++) (*motion)[i] = a->x[i] - model->rigid_origin[i % 3];
+  for (size_t f = 0; f < frames; f++) {
+    memcpy(pose + 12 * f, record->frame[row[f]].c, 3 * sizeof *pose);
+    memcpy(pose + 12 * f + 3, record->frame[row[f]].R, 9 * sizeof *pose);
+  }
+  a->x = *motion;
+  a->pose = pose;
+  return EP_OK;
+}
+
 static ep_status write_glb(const char *folder, const ep_scene *scene, const ep_mesh *mesh,
                            const ep_model *model, const ep_record *record, int frames,
                            const int *row, const ep_solids *solids, ep_error *err) {
   const size_t r = (size_t)model->size.r;
   char path[EP_PATH_MAX];
   int *triangle = NULL;
+  double *motion = NULL;
   ep_gltf_animation a = ep_default_gltf();
   double *q = calloc((size_t)frames * (r + 1), sizeof *q), *time = q + (size_t)frames * r;
   ep_status status = q ? ep_mesh_surface(mesh, &a.triangles, &triangle, err) : no_memory(err);
@@ -177,11 +199,13 @@ static ep_status write_glb(const char *folder, const ep_scene *scene, const ep_m
     a.triangle = triangle;
     status = make_gltf_solids(scene, solids, frames, time, &a, err);
   }
+  if (status == EP_OK) status = take_motion(&a, model, record, row, &motion, err);
   if (status == EP_OK) status = ep_gltf_write(path, &a, err);
   if (a.solid) {
     free((void *)a.solid[0].pose);
     free((void *)a.solid);
   }
+  free(motion);
   free(triangle);
   free(q);
   return status;
@@ -207,7 +231,7 @@ static ep_status write_png(const char *folder, const ep_scene *scene, const ep_m
     const int row = moments > 1 ? i * (record->rows - 1) / (moments - 1) : 0;
     double *at = x + (size_t)i * n3;
     if (i < moments) {
-      ep_positions(model, record->q + (size_t)row * r, at);
+      ep_record_positions(model, record, row, at);
       snprintf(label[i], sizeof label[i], "t = %.2f s", record->time[row]);
     } else {
       ep_positions(model, model->example_q + (size_t)(i - moments) * r, at);
@@ -248,6 +272,13 @@ static ep_status write_csv(const char *folder, const ep_model *model, const ep_r
   char path[EP_PATH_MAX];
   EP_TRY(ep_path_join(folder, "trajectory.csv", path, err));
   const bool green = record->green_weights != NULL;
+  const size_t rows = (size_t)record->rows;
+  double *center = calloc(12 * rows, sizeof *center); // and rotations behind
+  if (!center) return no_memory(err);
+  for (size_t i = 0; record->frame && i < rows; i++) {
+    memcpy(center + 3 * i, record->frame[i].c, 3 * sizeof *center);
+    memcpy(center + 3 * rows + 9 * i, record->frame[i].R, 9 * sizeof *center);
+  }
   const ep_csv_group groups[] = {
       {.name = "t", .components = 1, .data = record->time},
       {.name = "q", .components = model->size.r, .data = record->q, .numbered = true},
@@ -263,8 +294,13 @@ static ep_status write_csv(const char *folder, const ep_model *model, const ep_r
        .components = record->contact ? EP_CONTACT_COLUMNS : 0,
        .data = record->contact,
        .numbered = true},
+      {.name = "c", .components = record->frame ? 3 : 0, .data = center, .numbered = true},
+      {.name = "R", .components = record->frame ? 9 : 0, .data = center + 3 * rows},
+      {.name = "momentum", .components = record->frame ? 6 : 0, .data = record->momentum},
   };
-  return ep_csv_write(path, record->rows, 5, groups, err);
+  const ep_status status = ep_csv_write(path, record->rows, 8, groups, err);
+  free(center);
+  return status;
 }
 
 ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_shapes *shapes,

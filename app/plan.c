@@ -15,6 +15,7 @@ static const int stage_version[] = {
     [EP_STAGE_EIGEN] = 1, [EP_STAGE_MAP] = 2,   [EP_STAGE_POSES] = 3,    [EP_STAGE_MODES] = 1,
     [EP_STAGE_PATHS] = 2, [EP_STAGE_BASIS] = 1, [EP_STAGE_CUBATURE] = 1, [EP_STAGE_GREEN] = 1,
     [EP_STAGE_MODEL] = 4, [EP_STAGE_CUBIC] = 1, [EP_STAGE_TARGET] = 1,   [EP_STAGE_CONTACT] = 1,
+    [EP_STAGE_FRAME] = 1,
 };
 
 // Matching raises the number of functions to 20 (DESIGN "Maps"), coupling uses 2 m.
@@ -35,12 +36,13 @@ const char *ep_stage_kind_name(ep_stage_kind kind) {
       [EP_STAGE_CUBATURE] = "cubature", [EP_STAGE_MODEL] = "model",
       [EP_STAGE_CUBIC] = "cubic",       [EP_STAGE_TARGET] = "interpolation",
       [EP_STAGE_CONTACT] = "contact",   [EP_STAGE_GREEN] = "green",
+      [EP_STAGE_FRAME] = "frame",
   };
   return names[kind];
 }
 
 bool ep_stage_is_baked(ep_stage_kind kind) {
-  return kind != EP_STAGE_TARGET && kind != EP_STAGE_CONTACT;
+  return kind != EP_STAGE_TARGET && kind != EP_STAGE_CONTACT && kind != EP_STAGE_FRAME;
 }
 
 // Add a stage; its name is the kind, with ":detail" where detail is given.
@@ -257,8 +259,9 @@ static void plan_poses(planner *p) {
   const bool maps = any_map(shapes);
   ep_stage *stage = add(p, EP_STAGE_POSES, NULL, true, "%d example%s %s", shapes->examples,
                         shapes->examples > 1 ? "s" : "",
-                        maps ? "on the object's mesh, through descriptors and LB-ARAP"
-                             : "read directly, aligned at the fixed vertices");
+                        maps             ? "on the object's mesh, through descriptors and LB-ARAP"
+                        : shapes->nfixed ? "read directly, aligned at the fixed vertices"
+                                         : "read directly, aligned by mass");
   ep_hash_text text = key_of(stage->kind);
   ep_hash_add(&text, "m=%d", maps ? p->scene->eigenfunctions : 0);
   add_fixed(p, &text);
@@ -281,14 +284,15 @@ static void plan_poses(planner *p) {
 
 static ep_status plan_modes(planner *p) {
   const ep_shapes *shapes = p->shapes;
-  const int unknowns = 3 * (shapes->shape[0].mesh.nv - shapes->nfixed);
+  const int unknowns = 3 * (shapes->shape[0].mesh.nv - shapes->nfixed) - (shapes->nfixed ? 0 : 6);
   if (p->scene->modes > unknowns || p->scene->linear_modes > unknowns)
     return ep_fail(p->err, EP_ERR_SCENE,
                    "%s: reduction.modes is %d and linear_modes %d, but %s has only %d unknowns",
                    p->scene->path, p->scene->modes, p->scene->linear_modes,
                    shapes->shape[0].mesh.name, unknowns);
-  ep_stage *stage = add(p, EP_STAGE_MODES, NULL, true, "%d linear modes and their derivatives",
-                        p->scene->linear_modes);
+  ep_stage *stage =
+      add(p, EP_STAGE_MODES, NULL, true, "%d linear modes and their derivatives%s",
+          p->scene->linear_modes, shapes->nfixed ? "" : ", without the six rigid ones");
   ep_hash_text text = key_of(stage->kind);
   ep_hash_add(&text, "%s %s %d", shapes->shape[0].geometry.hex, shapes->physics.hex,
               p->scene->linear_modes);
@@ -436,6 +440,14 @@ static void plan_target(planner *p) {
         k > 1 ? "s" : "");
 }
 
+static void plan_frame(planner *p) {
+  if (p->shapes->nfixed)
+    add(p, EP_STAGE_FRAME, NULL, false, "something is fixed: the object does not move as a whole");
+  else
+    add(p, EP_STAGE_FRAME, NULL, true,
+        "nothing is fixed: momenta, rotation and inertial forces in every step");
+}
+
 static void plan_contact(planner *p) {
   const int count = p->scene->nobstacles;
   if (!count)
@@ -446,12 +458,6 @@ static void plan_contact(planner *p) {
 }
 
 static ep_status fill(planner *p) {
-  const ep_shapes *shapes = p->shapes;
-  if (shapes->nfixed == 0)
-    return ep_fail(p->err, EP_ERR_UNSUPPORTED,
-                   "%s: nothing is fixed; free motion comes with a later version. Give 'fixed' "
-                   "with a box, a plane or a file of vertices",
-                   p->scene->path);
   plan_eigen(p);
   EP_TRY(check_functions(p));
   EP_TRY(plan_maps(p));
@@ -464,6 +470,7 @@ static ep_status fill(planner *p) {
   plan_green(p);
   plan_model(p);
   plan_target(p);
+  plan_frame(p);
   plan_contact(p);
   return EP_OK;
 }
@@ -471,7 +478,7 @@ static ep_status fill(planner *p) {
 ep_status ep_plan_make(const ep_scene *scene, const ep_shapes *shapes, ep_plan *out,
                        ep_error *err) {
   memset(out, 0, sizeof *out);
-  const size_t most = (size_t)shapes->count + 2 * (size_t)shapes->examples + 12;
+  const size_t most = (size_t)shapes->count + 2 * (size_t)shapes->examples + 13;
   out->stage = calloc(most, sizeof *out->stage);
   if (!out->stage) return ep_fail(err, EP_ERR_MEMORY, "no memory for the plan");
   planner p = {.scene = scene, .shapes = shapes, .plan = out, .err = err};

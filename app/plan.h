@@ -19,6 +19,7 @@ typedef enum ep_stage_kind {
   EP_STAGE_CUBIC,    // coefficients of the exact polynomials
   EP_STAGE_MODEL,    // the .epm file
   EP_STAGE_TARGET,   // run time: interpolation of the examples in every step
+  EP_STAGE_FRAME,    // run time: the moving frame of a free object, in every step
   EP_STAGE_CONTACT,  // run time: contact with obstacles in every step
 } ep_stage_kind;
 
@@ -41,8 +42,7 @@ typedef struct ep_plan {
   ep_stage *stage;
 } ep_plan;
 
-// Errors: EP_ERR_UNSUPPORTED where nothing is fixed (free motion comes with a later version);
-// EP_ERR_SCENE where a value does not fit the meshes (more modes than unknowns); EP_ERR_IO for a
+// Errors: EP_ERR_SCENE where a value does not fit the meshes (more modes than unknowns); EP_ERR_IO for a
 // regions file.
 ep_status ep_plan_make(const ep_scene *scene, const ep_shapes *shapes, ep_plan *out, ep_error *err);
 void ep_plan_free(ep_plan *plan);

@@ -97,8 +97,9 @@ static ep_status read_simulation(const ep_scene_reader *r, const raw_simulation 
   }
   EP_TRY(ep_read_number(r, "simulation.dt", raw->dt, 1.0 / 60, 1e-6, 1, &out->dt));
   EP_TRY(ep_read_whole(r, "simulation.steps", raw->steps, 120, 1, 1000000, &out->steps));
-  EP_TRY(
-      ep_read_number(r, "simulation.damping.mass", damping->mass, 0.1, 0, 1e6, &out->damping_mass));
+  // Damping by mass is a drag against the still world: free objects fly undamped unless told.
+  EP_TRY(ep_read_number(r, "simulation.damping.mass", damping->mass, out->nfixed ? 0.1 : 0, 0, 1e6,
+                        &out->damping_mass));
   return ep_read_number(r, "simulation.damping.stiffness", damping->stiffness, 0.01, 0, 1e3,
                         &out->damping_stiffness);
 }
@@ -217,6 +218,7 @@ static ep_status convert(const ep_scene_reader *r, const raw_scene *raw, ep_scen
   out->seed = (uint64_t)seed;
   EP_TRY(read_object(r, &raw->object, out));
   EP_TRY(read_fixed(r, raw, out));
+  EP_TRY(ep_read_start(r, raw, out));
   EP_TRY(ep_read_regions(r, raw, out));
   EP_TRY(ep_read_families(r, raw, out));
   EP_TRY(read_reduction(r, raw->reduction, out));

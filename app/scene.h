@@ -122,6 +122,14 @@ typedef struct ep_sweep {
   double budget_seconds, budget_error; // 0: none
 } ep_sweep;
 
+// How a free object starts; centre of mass and axes as in reduced/frame.h.
+typedef struct ep_start {
+  bool placed;                 // position is given; else where the mesh is
+  double position[3];          // of the centre of mass
+  ep_turn rotation;            // about it
+  double velocity[3], spin[3]; // [m/s], [rad/s], world axes
+} ep_start;
+
 typedef struct ep_scene {
   char *path, *name;
   uint64_t seed;
@@ -148,6 +156,7 @@ typedef struct ep_scene {
   int methods;        // EP_METHOD bits
   ep_green green;     // alpha 0 without EP_METHOD_GREEN
   char algorithm[48]; // NLopt's name of it
+  ep_start start;     // all zero for a held object
   int nloads;
   ep_load *load;
   int nobstacles;

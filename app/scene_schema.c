@@ -297,6 +297,14 @@ static const cyaml_schema_field_t compare_fields[] = {
     CYAML_FIELD_END,
 };
 
+static const cyaml_schema_field_t start_fields[] = {
+    CYAML_FIELD_SEQUENCE("position", OPTIONAL, raw_start, position, &number, 3, 3),
+    PART(raw_start, rotation, turn_fields),
+    CYAML_FIELD_SEQUENCE("velocity", OPTIONAL, raw_start, velocity, &number, 3, 3),
+    CYAML_FIELD_SEQUENCE("spin", OPTIONAL, raw_start, spin, &number, 3, 3),
+    CYAML_FIELD_END,
+};
+
 static const cyaml_schema_field_t scene_fields[] = {
     CYAML_FIELD_FLOAT("schema", CYAML_FLAG_DEFAULT, raw_scene, schema),
     TEXT(raw_scene, name),
@@ -311,6 +319,7 @@ static const cyaml_schema_field_t scene_fields[] = {
     CYAML_FIELD_SEQUENCE("loads", OPTIONAL, raw_scene, loads, &load, 0, 256),
     CYAML_FIELD_SEQUENCE("obstacles", OPTIONAL, raw_scene, obstacles, &obstacle, 0, 10000),
     PART(raw_scene, contact, contact_fields),
+    PART(raw_scene, start, start_fields),
     PART(raw_scene, output, output_fields),
     PART(raw_scene, compare, compare_fields),
     CYAML_FIELD_END,

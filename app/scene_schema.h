@@ -139,6 +139,11 @@ typedef struct raw_compare {
   char **solvers, *budget;
   unsigned solvers_count;
 } raw_compare;
+typedef struct raw_start {
+  double *position, *velocity, *spin; // 3
+  unsigned position_count, velocity_count, spin_count;
+  raw_turn *rotation;
+} raw_start;
 typedef struct raw_scene {
   double schema;
   char *name;
@@ -158,6 +163,7 @@ typedef struct raw_scene {
   raw_obstacle *obstacles;
   unsigned obstacles_count;
   raw_contact *contact;
+  raw_start *start;
   raw_output *output;
   raw_compare *compare;
 } raw_scene;

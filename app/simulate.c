@@ -26,13 +26,18 @@ static ep_status make_record(const ep_scene *scene, const ep_model *model, ep_re
   out->energy = calloc(rows, sizeof *out->energy);
   out->step_ms = calloc(rows, sizeof *out->step_ms);
   out->target_ms = calloc(rows, sizeof *out->target_ms);
+  const bool rigid = model->size.rigid;
+  if (rigid) {
+    out->frame = calloc(rows, sizeof *out->frame);
+    out->momentum = calloc(6 * rows, sizeof *out->momentum);
+  }
   const bool lb = model->size.k && model->size.m, green = model->size.greens > 0;
   if (lb) out->weights = calloc(rows * shapes, sizeof *out->weights);
   if (green) out->green_weights = calloc(rows * shapes, sizeof *out->green_weights);
   if (scene->nobstacles) out->contact = calloc(rows * EP_CONTACT_COLUMNS, sizeof *out->contact);
   const bool good = (out->contact || !scene->nobstacles) && out->time && out->q && out->velocity &&
                     out->energy && out->step_ms && out->target_ms && (out->weights || !lb) &&
-                    (out->green_weights || !green);
+                    (out->green_weights || !green) && ((out->frame && out->momentum) || !rigid);
   if (good) return EP_OK;
   ep_record_free(out);
   return ep_fail(err, EP_ERR_MEMORY, "no memory for %d steps of %d modes", scene->steps,
@@ -57,6 +62,10 @@ static ep_status note(simulation *s, const ep_mesh *mesh, double *x) {
   memcpy(record->q + row * r, ep_state_q(s->state), r * sizeof *record->q);
   memcpy(record->velocity + row * r, ep_state_velocity(s->state), r * sizeof *record->velocity);
   record->energy[row] = s->done.last.elastic_energy + s->done.last.kinetic_energy;
+  if (record->frame) {
+    record->frame[row] = *ep_state_frame(s->state);
+    ep_state_momentum(s->state, record->momentum + 6 * row, record->momentum + 6 * row + 3);
+  }
   if (record->contact) {
     double *to = record->contact + row * EP_CONTACT_COLUMNS;
     const ep_contact_report *contact = &s->done.last.contact;
@@ -133,10 +142,24 @@ ep_status ep_simulate(const ep_scene *scene, const ep_shapes *shapes, const ep_m
   return status;
 }
 
+void ep_record_positions(const ep_model *model, const ep_record *record, int row, double *x) {
+  ep_positions(model, record->q + (size_t)row * (size_t)model->size.r, x);
+  if (!record->frame) return;
+  const ep_frame *f = &record->frame[row];
+  for (size_t v = 0; v < (size_t)model->size.n; v++) {
+    double y[3];
+    for (size_t i = 0; i < 3; i++) y[i] = x[3 * v + i] - model->rigid_origin[i];
+    for (size_t i = 0; i < 3; i++)
+      x[3 * v + i] = f->c[i] + f->R[3 * i] * y[0] + f->R[3 * i + 1] * y[1] + f->R[3 * i + 2] * y[2];
+  }
+}
+
 void ep_record_free(ep_record *record) {
   free(record->time);
   free(record->q);
   free(record->velocity);
+  free(record->frame);
+  free(record->momentum);
   free(record->energy);
   free(record->weights);
   free(record->green_weights);

@@ -20,6 +20,8 @@ typedef struct ep_record {
   double *contact;       // (rows x EP_CONTACT_COLUMNS); NULL without obstacles
   double *step_ms;       // (rows - 1) wall time of each step, interpolation included
   double *target_ms;     // (rows - 1) of the interpolation alone
+  ep_frame *frame;       // (rows) of a free object; NULL for a held one
+  double *momentum;      // (rows x 6) of a free object: linear, angular about the centre of mass
   int max_inverted;      // most inverted tets after any step
   int halvings;          // steps that had to be halved
   int newton_iterations, target_evaluations; // over the run
@@ -34,6 +36,9 @@ typedef struct ep_record {
 ep_status ep_simulate(const ep_scene *scene, const ep_shapes *shapes, const ep_model *model,
                       ep_log *log, ep_record *out, ep_error *err);
 void ep_record_free(ep_record *record);
+
+// Positions in the world after a step (n x 3).
+void ep_record_positions(const ep_model *model, const ep_record *record, int row, double *x);
 
 // Median of count values; 0 for none.
 double ep_median(int count, const double *value);

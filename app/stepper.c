@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "app/free_object.h"
 #include "app/obstacles.h"
 #include "reduced/bake/nlopt_target.h"
 
@@ -26,6 +27,7 @@ struct ep_stepper {
   double *load;            // (nloads x r) generalised force at full strength
   double *region_strength; // (regions) of a model with regions; NULL
   double *force;           // (r) of the step at hand
+  ep_free_loads free;      // loads of a free object, instead of `load` and `force`
   ep_obstacle *obstacle;   // (nobstacles) where they are in the step at hand
 };
 
@@ -41,6 +43,7 @@ static ep_status timed_solve(void *user, ep_state *state, const double *w, doubl
 
 static ep_status make_loads(ep_stepper *s, const ep_shapes *shapes, ep_error *err) {
   const size_t r = (size_t)s->model->size.r, count = (size_t)s->scene->nloads;
+  if (s->model->size.rigid) return ep_free_loads_make(s->scene, shapes, s->model, &s->free, err);
   double *mass = malloc((size_t)s->model->size.n * sizeof *mass);
   s->load = calloc(count * r + 1, sizeof *s->load);
   s->force = calloc(r, sizeof *s->force);
@@ -56,6 +59,10 @@ static ep_status make_loads(ep_stepper *s, const ep_shapes *shapes, ep_error *er
 
 static void set_force(ep_stepper *s, double t, bool loads) {
   const int r = s->model->size.r;
+  if (s->model->size.rigid) {
+    ep_free_loads_set(s->scene, &s->free, t, loads, &s->def);
+    return;
+  }
   memset(s->force, 0, (size_t)r * sizeof *s->force);
   for (int i = 0; i < s->scene->nloads && loads; i++) {
     const double strength = ep_load_profile(&s->scene->load[i], t);
@@ -87,7 +94,7 @@ static void set_up_step(ep_stepper *s) {
   const ep_scene *scene = s->scene;
   s->def = ep_default_step();
   s->def.integrator = scene->integrator;
-  s->def.force = s->force;
+  s->def.force = s->force; // NULL for a free object
   s->def.damping_mass = scene->damping_mass;
   s->def.damping_stiffness = scene->damping_stiffness;
   s->def.relief = scene->relief;
@@ -111,6 +118,7 @@ static ep_status make_state(ep_stepper *s, ep_error *err) {
 
 static ep_status set_up(ep_stepper *s, const ep_shapes *shapes, ep_error *err) {
   EP_TRY(make_state(s, err));
+  if (s->model->size.rigid) EP_TRY(ep_free_start(s->scene, s->state, err));
   EP_TRY(make_loads(s, shapes, err));
   if (s->model->size.k && s->model->size.m && s->scene->solver == EP_SOLVER_NLOPT)
     EP_TRY(ep_nlopt_target_create(s->state, s->scene->algorithm, 0, &s->nlopt, err));
@@ -135,6 +143,7 @@ ep_status ep_stepper_open(const ep_scene *scene, const ep_shapes *shapes, const 
 void ep_stepper_close(ep_stepper *s) {
   if (!s) return;
   ep_nlopt_target_free(s->nlopt);
+  ep_free_loads_free(&s->free);
   free(s->load);
   free(s->force);
   free(s->region_strength);

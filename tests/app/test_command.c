@@ -154,7 +154,7 @@ static void mistakes_have_documented_exit_codes(void **state) {
   expect_failure(3, "cut.veg", "eigen cut.veg");
   expect_failure(5, "out of range", "plan beam.yaml --set reduction.modes=0");
   expect_failure(5, "unknown key 'x'", "bake wrong.yaml");
-  expect_failure(9, "later version", "run free.yaml");
+  expect_failure(9, "free objects", "compare free.yaml");
   expect_failure(2, "cache-file", "bake beam.yaml --cache cache-file");
   expect_failure(2, "is a file", "run beam.yaml --cache cache-c --out beam.yaml/results");
   assert_int_equal(WEXITSTATUS(system(EP_COMMAND " plan beam.yaml --json >/dev/full 2>err.txt")),
@@ -163,7 +163,7 @@ static void mistakes_have_documented_exit_codes(void **state) {
 
 static void failures_are_json_too(void **state) {
   (void)state;
-  assert_int_equal(program("", "run free.yaml --json"), 9);
+  assert_int_equal(program("", "compare free.yaml --json"), 9);
   json_t *root = report();
   const json_t *failure = json_object_get(root, "error");
   assert_string_equal(json_string_value(json_object_get(failure, "status")), "unsupported");
