@@ -14,6 +14,7 @@ static const char general_help[] =
     "\n"
     "  run    simulate a scene (baking first what is not baked yet) and write the animation\n"
     "  compare  measure methods and settings of a scene against the full space\n"
+    "  report one page of the runs of many scenes, figure by figure\n"
     "  bake   prepare a scene: poses, basis, cubature, model; kept in the cache\n"
     "  plan   say which stages a scene needs, and why the others are left out\n"
     "  align  map the examples of a scene to its object and judge the maps\n"
@@ -68,6 +69,11 @@ static const struct argp_option align_options[] = {
     OPTION_SET,
     OPTION_CACHE,
     {0}};
+static const struct argp_option report_options[] = {
+    {"out", KEY_OUT, "DIR", 0,
+     "Folder that holds the runs' folders, and gets the page (default: out)", 0},
+    OPTION_JSON,
+    {0}};
 static const struct argp_option scene_options[] = {
     OPTION_JSON,
     OPTION_QUIET,
@@ -106,6 +112,11 @@ static const struct {
                             "Finished points are kept in the cache: an interrupted sweep goes on "
                             "where it stopped.",
                             run_options},
+    [EP_COMMAND_REPORT] = {"report", "FIGURES",
+                           "Make one page of many runs: FIGURES (JSON, as data/figures.json) lists "
+                           "figures and the scenes that show them; each scene's results are looked "
+                           "for in DIR/SCENE.",
+                           report_options},
     [EP_COMMAND_RUN] = {"run", "SCENE",
                         "Simulate a scene. Leaves the animation (.vtu/.pvd, .glb), a picture, the "
                         "trajectory and a summary in the folder of the results.",

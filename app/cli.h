@@ -17,6 +17,7 @@ typedef enum ep_command {
   EP_COMMAND_BAKE,
   EP_COMMAND_RUN,
   EP_COMMAND_COMPARE,
+  EP_COMMAND_REPORT,
   EP_COMMANDS
 } ep_command;
 

@@ -1,4 +1,4 @@
-// Commands of the baker that leave pictures to look at.
+// Commands that leave pictures and pages to look at.
 #ifndef EP_APP_COMMANDS_H
 #define EP_APP_COMMANDS_H
 
@@ -12,5 +12,8 @@ ep_status ep_command_eigen(const ep_cli *cli, ep_error *err);
 // align SCENE [--out DIR]: the record of every map, and of every example's pose on the object's
 // mesh; pictures and .vtu files of both in DIR. A bad map is said, and no error.
 ep_status ep_command_align(const ep_cli *cli, ep_session *session, ep_bake *bake, ep_error *err);
+
+// report FIGURES [--out DIR]: DIR/index.html of the runs in DIR.
+ep_status ep_command_report(const ep_cli *cli, ep_error *err);
 
 #endif

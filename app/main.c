@@ -1,5 +1,6 @@
 // The command `eigenpose`. It links neither PETSc nor SLEPc: what needs them is done by the baker,
 // a program of its own in libexec.
+#include "app/commands.h"
 #include "app/process.h"
 #include "app/run.h"
 
@@ -7,6 +8,8 @@ static ep_status perform(const ep_cli *cli, char **argv, ep_error *err) {
   switch (cli->command) {
   case EP_COMMAND_PLAN:
     return ep_command_plan(cli, err);
+  case EP_COMMAND_REPORT:
+    return ep_command_report(cli, err);
   case EP_COMMAND_RUN:
     return ep_command_run(cli, err);
   default:
