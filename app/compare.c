@@ -347,7 +347,18 @@ static ep_status do_all(sweep *w, ep_error *err) {
 
 // ---- command -----------------------------------------------------------------------------------
 
-static ep_status output(const sweep *w, ep_error *err) {
+// The reference of the first material and path, to look at.
+static ep_status picture(sweep *w, const char *folder, ep_error *err) {
+  const ep_sweep *s = &w->session->scene.sweep;
+  char path[EP_PATH_MAX], title[160];
+  EP_TRY(get_reference(w, s->material[0], w->result.point[0].path, err));
+  EP_TRY(ep_path_join(folder, "reference.png", path, err));
+  snprintf(title, sizeof title, "%s: the reference (%s)", w->result.name,
+           s->reference == EP_METHOD_FULL ? "full space" : "all elements");
+  return ep_compare_picture(path, title, &w->session->shapes.shape[0].mesh, &w->reference, err);
+}
+
+static ep_status output(sweep *w, ep_error *err) {
   char fallback[EP_PATH_MAX];
   const char *folder = w->cli->out;
   if (!folder) {
@@ -355,6 +366,7 @@ static ep_status output(const sweep *w, ep_error *err) {
     folder = fallback;
   }
   EP_TRY(ep_compare_write(folder, &w->result, err));
+  EP_TRY(picture(w, folder, err));
   if (w->cli->json) return ep_report_print(ep_compare_json(&w->result), err);
   ep_compare_text(stdout, &w->result);
   printf("report: %s/index.html\n", folder);

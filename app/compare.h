@@ -137,6 +137,9 @@ int ep_compare_crossovers(const ep_comparison *c, int s, ep_crossover list[EP_CR
 // What it says, a sentence without its full stop; text (EP_CROSSOVER_TEXT).
 void ep_compare_crossover_text(const ep_comparison *c, int s, const ep_crossover *x, char *text);
 
+// Six moments of a run from rest to its end, as a .png.
+ep_status ep_compare_picture(const char *path, const char *title, const ep_mesh *mesh,
+                             const ep_frames *frames, ep_error *err);
 // index.html, chart.svg, chart.png, results.csv, frames.csv, results.json in `folder`.
 ep_status ep_compare_write(const char *folder, const ep_comparison *c, ep_error *err);
 json_t *ep_compare_json(const ep_comparison *c);

@@ -63,6 +63,10 @@ static ep_status look_at_run(const reader *r, ep_figure_run *run) {
   run->summary = json_load_file(path, 0, NULL);
   EP_TRY(ep_path_join(folder, "plan.json", path, r->err));
   run->plan = json_load_file(path, 0, NULL);
+  EP_TRY(ep_path_join(folder, "full/results.json", path, r->err));
+  run->full = json_load_file(path, 0, NULL);
+  EP_TRY(ep_path_join(folder, "full/reference.png", path, r->err));
+  run->reference = ep_path_exists(path);
   EP_TRY(ep_path_join(folder, "strip.png", path, r->err));
   run->strip = ep_path_exists(path);
   EP_TRY(ep_path_join(folder, "final.png", path, r->err));
@@ -153,6 +157,7 @@ void ep_figures_free(ep_figures *figures) {
     for (int k = 0; k < figure->nruns; k++) {
       json_decref(figure->run[k].summary);
       json_decref(figure->run[k].plan);
+      json_decref(figure->run[k].full);
     }
     free(figure->run);
     free(figure->paper);

@@ -9,11 +9,12 @@
 
 // One run of a figure: the folder `ROOT/scene`, where `run` and `plan --json` left their results.
 typedef struct ep_figure_run {
-  const char *scene, *label; // borrowed from the list
-  json_t *summary;           // summary.json; NULL: the run failed
-  json_t *plan;              // plan.json; NULL where there is none
-  char why[1024];            // the last line of run.log, where the run failed
-  bool strip, final;         // strip.png, final.png are there
+  const char *scene, *label;    // borrowed from the list
+  json_t *summary;              // summary.json; NULL: the run failed
+  json_t *plan;                 // plan.json; NULL where there is none
+  json_t *full;                 // full/results.json of `compare`; NULL where there is none
+  char why[1024];               // the last line of run.log, where the run failed
+  bool strip, final, reference; // strip.png, final.png, full/reference.png are there
 } ep_figure_run;
 
 // A row of the paper's own tables; NaN where it says nothing.

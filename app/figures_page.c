@@ -92,6 +92,7 @@ static void run_card(FILE *out, const ep_figure_run *run) {
     fputs("</p>\n", out);
   }
   if (run->strip) image(out, run, "strip.png");
+  if (run->reference) image(out, run, "full/reference.png");
   fputs("<p class=\"note\">", out);
   ep_write_escaped(out, run->scene);
   fputs(".yaml</p>\n", out);
@@ -133,6 +134,40 @@ static void run_row(FILE *out, const ep_figure_run *run) {
   fputs("</tr>\n", out);
 }
 
+// The same scene in the full space, and how far the reduced run is from it.
+static void full_row(FILE *out, const ep_figure_run *run) {
+  size_t i;
+  json_t *point;
+  const json_t *reduced = NULL, *full = NULL;
+  json_array_foreach(json_object_get(run->full, "points"), i, point) {
+    const char *method = json_string_value(json_object_get(point, "method"));
+    if (method && strcmp(method, "full") == 0)
+      full = point;
+    else if (!reduced)
+      reduced = point;
+  }
+  if (!full) return;
+  fputs("<tr><th>", out);
+  ep_write_escaped(out, run->label);
+  fputs(", full space", out);
+  if (reduced)
+    fprintf(out, " (the reduced run stays within %.2g %% of the diagonal)",
+            100 * number(reduced, "position_error"));
+  fputs("</th>", out);
+  cell(out, "%.0f", number(run->full, "vertices"));
+  cell(out, "%.0f", number(run->full, "tets"));
+  cell(out, "%.0f", number(run->full, "examples"));
+  fputs("<td></td><td></td><td></td>", out);
+  const double interpolation = number(full, "target_median_us");
+  cell(out, "%.3g", 1e-3 * interpolation);
+  cell(out, "%.4g", 1e-3 * number(full, "step_median_us"));
+  cell(out, "%.4g", 1e3 * number(full, "dt"));
+  cell(out, "%.2f", number(full, "newton_per_step"));
+  fputs("<td></td><td></td>", out);
+  cell(out, "%.0f", number(full, "inverted"));
+  fputs("</tr>\n", out);
+}
+
 static void paper_row(FILE *out, const ep_figure_paper *p) {
   fputs("<tr class=\"paper\"><th>paper: ", out);
   ep_write_escaped(out, p->model);
@@ -166,7 +201,10 @@ static void table(FILE *out, const ep_figure *figure) {
   fputs("<div class=\"scroll\"><table><thead><tr>", out);
   for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) fprintf(out, "<th>%s</th>", heads[i]);
   fputs("</tr></thead><tbody>\n", out);
-  for (int i = 0; i < figure->nruns; i++) run_row(out, &figure->run[i]);
+  for (int i = 0; i < figure->nruns; i++) {
+    run_row(out, &figure->run[i]);
+    if (figure->run[i].full) full_row(out, &figure->run[i]);
+  }
   for (int i = 0; i < figure->npapers; i++) paper_row(out, &figure->paper[i]);
   fputs("</tbody></table></div>\n", out);
   if (!figure->note) return;

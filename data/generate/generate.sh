@@ -75,7 +75,7 @@ poses_cylinder() {
   pose cylinder.veg cylinder-twist.veg $twist150
   pose cylinder.veg cylinder-arc.veg arc 0,0,0 1,0,0 0,1,0 0.5 50 arc 0,0,0 -1,0,0 0,1,0 0.5 50
   pose cylinder.veg cylinder-s-own.veg $s65
-  pose cylinder.veg cylinder-hook.veg joint 0.02,0,0 1,0,0 0,1,0 0.36 80
+  pose cylinder.veg cylinder-hook.veg joint 0.02,0,0 1,0,0 0,1,0 0.4 65
 }
 
 mesh_cuboid() {
