@@ -177,12 +177,12 @@ static void over_obstacles(pass *p, const ep_step_def *def) {
 }
 
 static pass make_pass(ep_state *state, const ep_step_def *def, const ep_frame *frame,
-                      const double *q) {
+                      const double *q, int hessian) {
   ep_contact *c = &state->contact;
   return (pass){.state = state,
                 .model = state->model,
                 .law = ep_contact_choose(def, state->model->contact_scale[0],
-                                         state->model->rest_scale, &c->memory),
+                                         state->model->rest_scale, hessian, &c->memory),
                 .now = pose_of(state->model, q, frame),
                 .start = pose_of(state->model, state->contact_start, frame ? &c->start : NULL),
                 .lag = pose_of(state->model, state->contact_lag, frame ? &c->lag : NULL),
@@ -256,7 +256,7 @@ static void add_energy(pass *p, int vertex, const ep_contact_path *path) {
 double ep_contact_energy(ep_state *state, const ep_step_def *def, const ep_frame *frame,
                          const double *q, double *g, double *h, int n) {
   if (!ep_contact_acts(state, def)) return 0;
-  pass p = make_pass(state, def, frame, q);
+  pass p = make_pass(state, def, frame, q, h != NULL);
   p.visit = add_energy;
   p.scale = ep_contact_share(def);
   p.g = g, p.h = h, p.n = n;
@@ -297,7 +297,7 @@ static void add_report(pass *p, int vertex, const ep_contact_path *path) {
 
 static void measure(ep_state *state, const ep_step_def *def, const ep_frame *frame, const double *q,
                     ep_contact_report *report) {
-  pass p = make_pass(state, def, frame, q);
+  pass p = make_pass(state, def, frame, q, 0);
   const ep_contact_memory *m = &state->contact.memory;
   *report = (ep_contact_report){.stiffness = p.law.stiffness,
                                 .raised = m->trial_raise,
@@ -326,7 +326,7 @@ int ep_contact_again(ep_state *state, const ep_step_def *def, const ep_frame *fr
   ep_contact_report now;
   if (!ep_contact_acts(state, def)) return 0;
   measure(state, def, frame, q, &now);
-  pass p = make_pass(state, def, frame, q);
+  pass p = make_pass(state, def, frame, q, 0);
   p.visit = add_change;
   over_obstacles(&p, def);
   if (!ep_contact_retry(def, state->model->rest_scale, now.deepest, p.change, p.pressing,

@@ -26,15 +26,16 @@ int ep_contact_def_valid(const ep_step_def *def) {
   return 1;
 }
 
-ep_contact_law ep_contact_choose(const ep_step_def *def, double unit, double diagonal,
-                                 const ep_contact_memory *memory) {
+ep_contact_law ep_contact_choose(const ep_step_def *def, double unit, double diagonal, int hessian,
+                                 ep_contact_memory *memory) {
   const ep_contact_def *c = &def->contact;
   return (ep_contact_law){
       .stiffness = c->stiffness > 0 ? c->stiffness : stiffness_ratio * unit * memory->trial_raise,
       .thickness = c->thickness > 0 ? c->thickness : thickness_share * diagonal,
       .damping = c->damping,
       .creep = creep_share * diagonal,
-      .dt = def->dt};
+      .dt = def->dt,
+      .careful = hessian && memory->hessians++ % 2 == 1};
 }
 
 double ep_contact_share(const ep_step_def *def) {
@@ -43,7 +44,7 @@ double ep_contact_share(const ep_step_def *def) {
 
 void ep_contact_memory_begin(ep_contact_memory *m) {
   m->trial_raise = m->raise;
-  m->passes = m->raises = 0;
+  m->passes = m->raises = m->hessians = 0;
 }
 
 static int raise_stiffness(const ep_step_def *def, double diagonal, double deepest,

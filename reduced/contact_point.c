@@ -60,8 +60,8 @@ static void add_outer(double scale, const double a[3], double h[9]) {
 }
 
 // Friction force N mu f1(|s|)/|s| s with f1 = 2 y/e - (y/e)^2 below e, else 1.
-static void add_friction(double limit, double creep, const double n[3], const double s[3],
-                         ep_contact_action *out) {
+static void add_friction(double limit, double creep, int careful, const double n[3],
+                         const double s[3], ep_contact_action *out) {
   const double y = sqrt(dot3(s, s)), t = y / creep;
   double ratio, bend; // f1(y)/y and f1'(y)
   if (y < creep) {
@@ -71,7 +71,7 @@ static void add_friction(double limit, double creep, const double n[3], const do
   } else {
     out->energy += limit * y;
     ratio = 1 / y;
-    bend = 0;
+    bend = careful ? ratio : 0;
   }
   for (int i = 0; i < 3; i++) out->gradient[i] += limit * ratio * s[i];
   // ratio (I - n n^T - d d^T) + bend d d^T, d = s/|s|: both factors >= 0.
@@ -102,7 +102,7 @@ static int add_lagged(const ep_contact_law *law, const facing *face, const ep_co
   }
   const double limit = o->friction * law->stiffness * area * slope;
   for (int i = 0; i < 3; i++) s[i] -= along * n[i];
-  if (limit > 0) add_friction(limit, law->creep * law->dt, n, s, out);
+  if (limit > 0) add_friction(limit, law->creep * law->dt, law->careful, n, s, out);
   return 1;
 }
 

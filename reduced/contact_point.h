@@ -14,6 +14,8 @@ typedef struct ep_contact_law {
   double damping;   // c [s]: normal pressure c k phi'' times the speed
   double creep;     // speed up to which friction is viscous [length/s]
   double dt;        // of the step [s]
+  int careful;      // Hessian of friction that lies above it everywhere: Newton cannot overshoot
+                    // from sliding past sticking, but converges linearly
 } ep_contact_law;
 
 // Where the point is. Pointers that a law does not need may be NULL: start and lag without

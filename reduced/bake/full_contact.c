@@ -83,13 +83,13 @@ static ep_contact_path path_of(const ep_full_contact *c, const ep_obstacle *o, i
                            .fast = o->kind != EP_OBSTACLE_PLANE};
 }
 
-static ep_contact_law law_of(const ep_full_contact *c, const ep_step_def *def) {
-  return ep_contact_choose(def, c->unit, c->diagonal, &c->memory);
+static ep_contact_law law_of(ep_full_contact *c, const ep_step_def *def, bool hessian) {
+  return ep_contact_choose(def, c->unit, c->diagonal, hessian, &c->memory);
 }
 
-double ep_full_contact_energy(const ep_full_contact *c, const ep_step_def *def, const double *u,
+double ep_full_contact_energy(ep_full_contact *c, const ep_step_def *def, const double *u,
                               double *g, ep_csr *k) {
-  const ep_contact_law law = law_of(c, def);
+  const ep_contact_law law = law_of(c, def, k != NULL);
   const double share = ep_contact_share(def);
   double sum = 0;
   positions at;
@@ -107,9 +107,9 @@ double ep_full_contact_energy(const ep_full_contact *c, const ep_step_def *def, 
   return share * sum;
 }
 
-void ep_full_contact_measure(const ep_full_contact *c, const ep_step_def *def, const double *u,
+void ep_full_contact_measure(ep_full_contact *c, const ep_step_def *def, const double *u,
                              ep_contact_report *report) {
-  const ep_contact_law law = law_of(c, def);
+  const ep_contact_law law = law_of(c, def, false);
   positions at;
   *report = (ep_contact_report){.stiffness = law.stiffness,
                                 .raised = c->memory.trial_raise,
@@ -125,7 +125,7 @@ void ep_full_contact_measure(const ep_full_contact *c, const ep_step_def *def, c
 }
 
 int ep_full_contact_again(ep_full_contact *c, const ep_step_def *def, const double *u) {
-  const ep_contact_law law = law_of(c, def);
+  const ep_contact_law law = law_of(c, def, false);
   ep_contact_report now;
   positions at;
   double change = 0, pressing = 0;

@@ -22,11 +22,11 @@ void ep_full_contact_free(ep_full_contact *contact);
 // As the functions of reduced/contact.h, for displacements (3n).
 void ep_full_contact_begin(ep_full_contact *contact, const double *start, const double *ahead);
 // Gradient added to g (3n), Hessian to k (3 x 3 blocks on the diagonal) unless NULL.
-double ep_full_contact_energy(const ep_full_contact *contact, const ep_step_def *def,
-                              const double *u, double *g, ep_csr *k);
+double ep_full_contact_energy(ep_full_contact *contact, const ep_step_def *def, const double *u,
+                              double *g, ep_csr *k);
 int ep_full_contact_again(ep_full_contact *contact, const ep_step_def *def, const double *u);
 // Torque about the origin.
-void ep_full_contact_measure(const ep_full_contact *contact, const ep_step_def *def,
-                             const double *u, ep_contact_report *report);
+void ep_full_contact_measure(ep_full_contact *contact, const ep_step_def *def, const double *u,
+                             ep_contact_report *report);
 
 #endif

@@ -151,8 +151,12 @@ enum { BACKTRACKS = 40 };
 // the larger one where energies no longer tell points apart.
 static const double TINY_STRAIN = 1e-13, SMALL_STRAIN = 1e-9;
 
+// Of the Newton step; or how far it goes over the diagonal: rigid motion strains nothing.
 static double largest_strain(const ep_full *full) {
   double largest = 0;
+  const double diagonal = ep_mesh_diagonal(full->fem->mesh);
+  for (int i = 0; i < full->n3; i++) largest = fmax(largest, fabs(full->direction[i]) / diagonal);
+  largest *= largest;
   for (int e = 0; e < full->fem->mesh->nt; e++) {
     double d[9];
     ep_fem_displacement_gradient(full->fem, e, full->direction, d);
