@@ -185,7 +185,7 @@ void ep_region_suspects(int regions, const double *overlap, const unsigned char 
 // same_family: larger turns of the frame are expected.
 ep_status ep_map_judge(const ep_side *from, const ep_side *to, const unsigned char *use,
                        bool same_family, ep_map *map, ep_error *err);
-// The same without meshes, from what the record holds: verdict and reasons.
-void ep_map_verdict(bool same_family, ep_map *map);
+// Verdict and reasons from what the record holds; the meshes for names and numbers of vertices.
+void ep_map_verdict(const ep_mesh *from, const ep_mesh *to, bool same_family, ep_map *map);
 
 #endif

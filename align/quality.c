@@ -321,7 +321,7 @@ ep_status ep_map_judge(const ep_side *from, const ep_side *to, const unsigned ch
   EP_TRY(judge_basis(from, map, err));
   EP_TRY(judge_points(from, to, map, err));
   if (use) EP_TRY(judge_regions(from, to, use, map, err));
-  ep_map_verdict(same_family, map);
+  ep_map_verdict(from->shape->mesh, to->shape->mesh, same_family, map);
   return EP_OK;
 }
 
@@ -339,7 +339,7 @@ static void weigh(ep_map_quality *q, const char *what, double value, double doub
 }
 
 // More than one frame fits: name them, and the landmark that tells them apart.
-static void weigh_rivals(ep_map_quality *q) {
+static void weigh_rivals(const ep_mesh *from, const ep_mesh *to, ep_map_quality *q) {
   if (!q->rivals) return;
   if (q->verdict == EP_MAP_GOOD) q->verdict = EP_MAP_DOUBTFUL;
   char *end = q->reasons + sizeof q->reasons, *at = q->reasons + strlen(q->reasons);
@@ -356,10 +356,11 @@ static void weigh_rivals(ep_map_quality *q) {
     at += snprintf(at, (size_t)(end - at), " and %d more", q->rivals - 3);
   if (at < end)
     snprintf(at, (size_t)(end - at),
-             " fit%s as well: nothing tells them apart. Give a landmark for vertex %d "
-             "(counted from 0), which goes to vertex %d here and to %d otherwise, or say that the "
-             "authored frame is right",
-             q->rivals > 1 ? "" : "s", q->settle_from, q->settle_to, q->settle_other);
+             " fit%s as well: nothing tells them apart. One landmark settles it: vertex %d of %s "
+             "with vertex %d of %s, as mapped now, or with %d (numbers of the files, from 1); or "
+             "say that the authored frame is right",
+             q->rivals > 1 ? "" : "s", from->file_vertex[q->settle_from] + 1, from->name,
+             to->file_vertex[q->settle_to] + 1, to->name, to->file_vertex[q->settle_other] + 1);
 }
 
 static void weigh_inverted(ep_map_quality *q) {
@@ -378,7 +379,7 @@ void ep_map_note_inverted(ep_map *map, int inverted, int left) {
   weigh_inverted(&map->quality);
 }
 
-void ep_map_verdict(bool same_family, ep_map *map) {
+void ep_map_verdict(const ep_mesh *from, const ep_mesh *to, bool same_family, ep_map *map) {
   ep_map_quality *q = &map->quality;
   q->verdict = EP_MAP_GOOD;
   q->reasons[0] = '\0';
@@ -389,7 +390,7 @@ void ep_map_verdict(bool same_family, ep_map *map) {
     weigh(q, "turn of the frame in degrees", q->frame_angle,
           same_family ? FRAME_DOUBTFUL_FAMILY : FRAME_DOUBTFUL, HUGE_VAL, true,
           "turn the example as the object stands, or give regions");
-  weigh_rivals(q);
+  weigh_rivals(from, to, q);
   double jaccard = 0;
   int used = 0;
   for (int g = 0; g < q->regions; g++) {

@@ -21,19 +21,24 @@ static ep_status read_landmark(const ep_scene_reader *r, const char *key, const 
   EP_TRY(mark(r, key, raw->rest, raw->rest_at, &out->rest));
   if (out->rest.given && !family->rest)
     return ep_read_refuse(r, key, "the family has no rest shape of its own; give object and poses");
-  if (out->object.given + out->rest.given + (raw->poses_count > 0) < 2)
-    return ep_read_refuse(
-        r, key, "name the place on two shapes: object, rest (or object_at, rest_at), poses");
-  if (raw->poses_count && (int)raw->poses_count != family->poses)
+  if (raw->poses_count && raw->poses_at_count)
+    return ep_read_refuse(r, key, "give poses (vertices) or poses_at (points), not both");
+  const unsigned poses = raw->poses_count + raw->poses_at_count;
+  if (out->object.given + out->rest.given + (poses > 0) < 2)
     return ep_read_refuse(r, key,
-                          "poses lists %u vertices, but the family has %d poses; give one for each",
-                          raw->poses_count, family->poses);
-  out->pose = calloc(raw->poses_count + 1, sizeof *out->pose);
+                          "name the place on two shapes: object, rest, poses (vertices), or "
+                          "object_at, rest_at, poses_at (points)");
+  if (poses && (int)poses != family->poses)
+    return ep_read_refuse(r, key,
+                          "%s lists %u places, but the family has %d poses; give one for each",
+                          raw->poses_count ? "poses" : "poses_at", poses, family->poses);
+  out->pose = calloc(poses + 1, sizeof *out->pose);
   if (!out->pose) return ep_read_no_memory(r);
-  out->poses = (int)raw->poses_count;
-  for (unsigned i = 0; i < raw->poses_count; i++) {
-    snprintf(part, sizeof part, "%.90s.poses.%u", key, i);
-    EP_TRY(mark(r, part, &raw->poses[i], NULL, &out->pose[i]));
+  out->poses = (int)poses;
+  for (unsigned i = 0; i < poses; i++) {
+    snprintf(part, sizeof part, "%.90s.poses%s.%u", key, raw->poses_count ? "" : "_at", i);
+    EP_TRY(mark(r, part, raw->poses_count ? &raw->poses[i] : NULL,
+                raw->poses_count ? NULL : raw->poses_at[i], &out->pose[i]));
   }
   return EP_OK;
 }

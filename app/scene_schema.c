@@ -14,6 +14,8 @@
   CYAML_FIELD_SEQUENCE_FIXED(#member, CYAML_FLAG_DEFAULT, type, member, &number, 3)
 
 static const cyaml_schema_value_t number = {CYAML_VALUE_FLOAT(CYAML_FLAG_DEFAULT, double)};
+static const cyaml_schema_value_t point = {
+    CYAML_VALUE_SEQUENCE_FIXED(CYAML_FLAG_DEFAULT, double, &number, 3)};
 static const cyaml_schema_value_t text = {
     CYAML_VALUE_STRING(CYAML_FLAG_POINTER, char *, 1, CYAML_UNLIMITED)};
 
@@ -107,6 +109,7 @@ static const cyaml_schema_field_t landmark_fields[] = {
     CYAML_FIELD_SEQUENCE("object_at", OPTIONAL, raw_landmark, object_at, &number, 3, 3),
     CYAML_FIELD_SEQUENCE("rest_at", OPTIONAL, raw_landmark, rest_at, &number, 3, 3),
     CYAML_FIELD_SEQUENCE("poses", OPTIONAL, raw_landmark, poses, &number, 1, 64),
+    CYAML_FIELD_SEQUENCE("poses_at", OPTIONAL, raw_landmark, poses_at, &point, 1, 64),
     CYAML_FIELD_END,
 };
 static const cyaml_schema_value_t landmark = {

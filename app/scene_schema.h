@@ -33,6 +33,8 @@ typedef struct raw_landmark {
   unsigned object_at_count, rest_at_count;
   double *poses; // vertices
   unsigned poses_count;
+  double (*poses_at)[3]; // points
+  unsigned poses_at_count;
 } raw_landmark;
 typedef struct raw_map_field {
   char *name, *object, *rest, *poses;

@@ -87,7 +87,7 @@ static void everything_is_read(void **state) {
       "fixed:\n  - plane: {point: [0, 0, 0], normal: [1, 0, 0]}\n  - file: held.txt\n"
       "families:\n  - name: own\n    poses: [box.veg, box.veg]\n    map: {accept: true,\n"
       "    frame: authored, eigenfunctions: 6, landmarks: [{object: 3, poses: [4, 5]},\n"
-      "    {object_at: [0, 0.5, 1], poses: [6, 7]}]}\n"
+      "    {object_at: [0, 0.5, 1], poses_at: [[6, 7, 8], [9, 10, 11]]}]}\n"
       "reduction: {modes: 12, amplitude: 0.1}\n"
       "simulation: {dt: 0.01, steps: 5, damping: {mass: 0.2}}\n"
       "examples: {strength: 0.5, force: linear, solver: newton}\n"
@@ -110,6 +110,7 @@ static void everything_is_read(void **state) {
   assert_true(l[0].object.given && l[0].object.vertex == 3 && !l[0].rest.given);
   assert_true(l[0].poses == 2 && l[0].pose[1].vertex == 5);
   assert_true(l[1].object.given && l[1].object.vertex == 0 && l[1].object.at[1] == 0.5);
+  assert_true(l[1].poses == 2 && l[1].pose[1].vertex == 0 && l[1].pose[1].at[2] == 11);
   assert_int_equal(s.force, EP_EXAMPLE_LINEAR);
   assert_int_equal(s.solver, EP_SOLVER_NEWTON);
   assert_true(s.load[0].gravity && s.load[0].vector[1] == -9.81);
