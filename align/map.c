@@ -182,8 +182,27 @@ static ep_status match_once(job *j, ep_trial *t, ep_error *err) {
     EP_TRY(ep_trial_run(&j->from, &j->to, &rule, REFRAME_ROUNDS, t, err));
   }
   t->rounds += chosen->rounds;
-  if (t->cycle > CYCLE_FALLBACK) EP_TRY(try_plain(j, t, err));
+  // Plain neighbours know nothing of landmarks.
+  if (t->cycle > CYCLE_FALLBACK && !j->options->landmarks) EP_TRY(try_plain(j, t, err));
   return EP_OK;
+}
+
+// Round trip as ep_match_cycle, through the points in tets: without the noise of vertices.
+static double fine_cycle(const job *j, const int *back, const int *tet, const double *weight) {
+  const ep_side *from = &j->from;
+  double sum = 0;
+  for (int i = 0; i < from->n; i++) {
+    const int *corner = j->to.shape->mesh->tet + 4 * (size_t)tet[i];
+    double d2 = 0;
+    for (int c = 0; c < 3; c++) {
+      double d = -from->x[3 * (size_t)i + c];
+      for (int k = 0; k < 4; k++)
+        d += weight[4 * (size_t)i + k] * from->x[3 * (size_t)back[corner[k]] + c];
+      d2 += d * d;
+    }
+    sum += from->share[i] * d2;
+  }
+  return sqrt(sum) / from->radius;
 }
 
 // Vertices to points in tets: last, because regions in wrong order pull a map farther with every
@@ -195,7 +214,7 @@ static ep_status make_finer(const job *j, ep_trial *t, int *tet, double *weight,
     EP_TRY(ep_match_plain(&j->from, &j->to, t->r, t->p, tet, weight, err));
   else
     EP_TRY(ep_match_levels(&j->from, &j->to, t->r, &rule, t->p, tet, weight, err));
-  t->cycle = ep_match_cycle(&j->from, t->p, t->back);
+  t->cycle = fine_cycle(j, t->back, tet, weight);
   return EP_OK;
 }
 

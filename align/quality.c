@@ -338,6 +338,11 @@ static void weigh(ep_map_quality *q, const char *what, double value, double doub
            used ? "; " : "", what, value, high ? "at most" : "at least", doubtful, advice);
 }
 
+static const char *file_name(const ep_mesh *mesh) {
+  const char *slash = strrchr(mesh->name, '/');
+  return slash ? slash + 1 : mesh->name;
+}
+
 // More than one frame fits: name them, and the landmark that tells them apart.
 static void weigh_rivals(const ep_mesh *from, const ep_mesh *to, ep_map_quality *q) {
   if (!q->rivals) return;
@@ -359,8 +364,9 @@ static void weigh_rivals(const ep_mesh *from, const ep_mesh *to, ep_map_quality 
              " fit%s as well: nothing tells them apart. One landmark settles it: vertex %d of %s "
              "with vertex %d of %s, as mapped now, or with %d (numbers of the files, from 1); or "
              "say that the authored frame is right",
-             q->rivals > 1 ? "" : "s", from->file_vertex[q->settle_from] + 1, from->name,
-             to->file_vertex[q->settle_to] + 1, to->name, to->file_vertex[q->settle_other] + 1);
+             q->rivals > 1 ? "" : "s", from->file_vertex[q->settle_from] + 1, file_name(from),
+             to->file_vertex[q->settle_to] + 1, file_name(to),
+             to->file_vertex[q->settle_other] + 1);
 }
 
 static void weigh_inverted(ep_map_quality *q) {

@@ -2,7 +2,7 @@
 # Makes the meshes of data/meshes again from their descriptions here.
 #
 #   generate.sh [--poses] [GROUP...]    groups: bar cylinder cuboid plane bird car teddy cross
-#                                       column dog shoe; all of them where none is named
+#                                       column dog shoe fish; all of them where none is named
 #
 # --poses leaves the stored meshes alone and makes the poses that share their connectivity.
 # Needs gmsh and a C compiler. The stored meshes came from gmsh 4.8.4; its HXT mesher places inner
@@ -162,15 +162,21 @@ poses_shoe() {
 joint -0.26,0.125,0 0,1,0 -1,0,0 0.22 35
 }
 
+mesh_fish() {
+  another fish 0.062 fish.veg
+  another fish 0.066 fish-swim-own.veg s 0.3,0,0 -1,0,0 0,0,1 1.2 40
+}
+poses_fish() { pose fish.veg fish-swim.veg s 0.3,0,0 -1,0,0 0,0,1 1.2 40; }
+
 only_poses=
 if [ "${1:-}" = --poses ]; then
   only_poses=1
   shift
 fi
-[ $# -gt 0 ] || set -- bar cylinder cuboid plane bird car teddy cross column dog shoe
+[ $# -gt 0 ] || set -- bar cylinder cuboid plane bird car teddy cross column dog shoe fish
 for group in "$@"; do
   case $group in
-  bar | cylinder | cuboid | plane | bird | car | teddy | cross | column | dog | shoe) ;;
+  bar | cylinder | cuboid | plane | bird | car | teddy | cross | column | dog | shoe | fish) ;;
   *) echo "generate.sh: there is no group $group" >&2 && exit 1 ;;
   esac
   [ "$only_poses" ] || "mesh_$group"
