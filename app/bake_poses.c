@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "app/bake.h"
+#include "app/pose_local.h"
 #include "linalg/dense.h"
 #include "reduced/bake/inertia.h"
 
@@ -165,35 +166,48 @@ static ep_status hold_rigidly(const ep_shapes *shapes, double *u, ep_error *err)
   return EP_OK;
 }
 
-// A pose on the object's own connectivity: the fixed vertices are set to rest exactly.
-static ep_status pose_direct(ep_bake *bake, const ep_pose_source *example, double *u,
-                             ep_pose_quality *quality, ep_error *err) {
-  EP_TRY(transfer(bake, example, u, err));
+// The pose where it belongs: held by the fixed vertices, or limited to a region (limits not NULL).
+static ep_status place(const ep_bake *bake, const ep_pose_limits *limits, double *u,
+                       ep_pose_quality *quality, ep_error *err) {
+  if (limits) return ep_pose_limit(limits, u, &quality->fixed_shift, err);
   EP_TRY(hold_rigidly(bake->shapes, u, err));
   quality->fixed_shift = shift_of(bake->shapes, u);
+  return EP_OK;
+}
+
+// A pose on the object's own connectivity: the fixed vertices are set to rest exactly.
+static ep_status pose_direct(ep_bake *bake, const ep_pose_source *example,
+                             const ep_pose_limits *limits, double *u, ep_pose_quality *quality,
+                             ep_error *err) {
+  EP_TRY(transfer(bake, example, u, err));
+  EP_TRY(place(bake, limits, u, quality, err));
   for (int i = 0; i < bake->shapes->nfixed; i++)
     memset(u + 3 * (size_t)bake->shapes->fixed[i], 0, 3 * sizeof *u);
   return EP_OK;
+}
+
+static int functions_of(const ep_bake *bake, const ep_pose_source *example) {
+  return bake->shapes->sets ? ep_shapes_set_functions(bake->scene, bake->shapes, example->set)
+                            : bake->scene->eigenfunctions;
 }
 
 // A pose of another mesh: its low coefficients d, the rest as rigid as possible. The rigid motion
 // that holds the fixed vertices is found on the smooth shape X + Phi d and applied before the
 // coefficients are taken, because Phi leaves the constant function out.
 static ep_status pose_mapped(ep_bake *bake, const ep_pose_source *example,
-                             const unsigned char *held, double *u, ep_pose_quality *quality,
-                             ep_error *err) {
+                             const ep_pose_limits *limits, const unsigned char *held, double *u,
+                             ep_pose_quality *quality, ep_error *err) {
   const ep_mesh *mesh = &bake->shapes->shape[0].mesh;
   EP_TRY(ep_bake_lb(bake, 0, err));
   EP_TRY(transfer(bake, example, u, err));
   const ep_lb *all = &bake->lb[0];
   ep_lb low = *all; // the first m functions of the same space
-  low.m = bake->scene->eigenfunctions;
+  low.m = functions_of(bake, example);
   double *d = malloc(3 * (size_t)low.m * sizeof *d);
   if (!d) return no_memory(err);
   ep_lb_project(&low, &bake->mass[0], u, d);
   ep_lb_reconstruct(&low, d, u);
-  ep_status status = hold_rigidly(bake->shapes, u, err);
-  quality->fixed_shift = shift_of(bake->shapes, u);
+  ep_status status = place(bake, limits, u, quality, err);
   if (status == EP_OK) {
     ep_lb_project(&low, &bake->mass[0], u, d);
     ep_pose_options options = ep_default_pose_options();
@@ -225,6 +239,14 @@ static ep_status complain(const ep_bake *bake, int index, ep_error *err, const c
 static ep_status report_shift(const ep_bake *bake, int index, ep_error *err) {
   const ep_pose_quality *q = &bake->quality[index];
   char text[320];
+  if (ep_shapes_local(bake->shapes, &bake->shapes->example[index])) {
+    if (q->fixed_shift > shift_doubtful)
+      ep_warn(bake->log,
+              "example %s does not leave the edge of its region as it is: off by %.2g of the "
+              "diagonal (rms); give the region more of the pose, or a longer soft edge",
+              bake->shapes->shape[bake->shapes->example[index].shape].name, q->fixed_shift);
+    return EP_OK;
+  }
   if (q->fixed_shift > shift_refused) {
     snprintf(text, sizeof text,
              "the fixed vertices would move by %.2g of the diagonal (rms) in it; hold what stands "
@@ -286,7 +308,7 @@ static ep_status repair_pose(ep_bake *bake, const ep_pose_source *example,
   const bool mapped = example->route == EP_ROUTE_MAP;
   ep_repair_options options = ep_default_repair_options();
   ep_repair_report report;
-  options.m = mapped ? bake->scene->eigenfunctions : 0;
+  options.m = mapped ? functions_of(bake, example) : 0;
   options.held = held;
   EP_TRY(ep_lb_repair(&bake->shapes->shape[0].mesh, mapped ? &bake->lb[0] : NULL, &options, u,
                       &report, err));
@@ -303,14 +325,19 @@ static ep_status repair_pose(ep_bake *bake, const ep_pose_source *example,
   return EP_OK;
 }
 
-static ep_status make_pose(ep_bake *bake, int index, const unsigned char *held, ep_error *err) {
+static ep_status make_pose(ep_bake *bake, int index, const unsigned char *fixed, ep_error *err) {
   const ep_pose_source *example = &bake->shapes->example[index];
+  const double *region = ep_shapes_local(bake->shapes, example);
+  ep_pose_limits local = {0}, *limits = region ? &local : NULL;
   double *u = bake->poses + (size_t)index * 3 * (size_t)bake->shapes->shape[0].mesh.nv;
   ep_pose_quality *quality = &bake->quality[index];
-  const ep_status status = example->route == EP_ROUTE_SAME
-                               ? pose_direct(bake, example, u, quality, err)
-                               : pose_mapped(bake, example, held, u, quality, err);
-  if (status == EP_OK) EP_TRY(repair_pose(bake, example, held, u, quality, err));
+  if (region) EP_TRY(ep_pose_limits_make(bake->shapes, region, limits, err));
+  const unsigned char *held = region ? limits->held : fixed;
+  ep_status status = example->route == EP_ROUTE_SAME
+                         ? pose_direct(bake, example, limits, u, quality, err)
+                         : pose_mapped(bake, example, limits, held, u, quality, err);
+  if (status == EP_OK) status = repair_pose(bake, example, held, u, quality, err);
+  ep_pose_limits_free(&local);
   if (status != EP_OK)
     return ep_fail_context(err, "example %s", bake->shapes->shape[example->shape].name);
   EP_TRY(report_shift(bake, index, err));
