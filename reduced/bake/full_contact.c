@@ -39,7 +39,7 @@ ep_status ep_full_contact_create(const ep_fem *fem, ep_full_contact **out, ep_er
   c->lag = c->start + 3 * n;
   c->ahead = c->lag + 3 * n;
   for (size_t v = 0; v < n; v++) {
-    if (!(c->area[v] > 0)) continue;
+    if (!(c->area[v] > 0) || fem->held[3 * v]) continue;
     c->area[c->count] = c->area[v];
     c->vertex[c->count++] = (int)v;
   }

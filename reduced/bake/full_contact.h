@@ -1,5 +1,5 @@
-// Contact of the full-space reference: the law of reduced/contact_point.h on every surface vertex,
-// by a plain loop. Private to the full-space step.
+// Contact of the full-space reference: the law of reduced/contact_point.h on every surface vertex that
+// is not held, by a plain loop. Private to the full-space step.
 #ifndef EP_BAKE_FULL_CONTACT_H
 #define EP_BAKE_FULL_CONTACT_H
 
@@ -9,7 +9,7 @@
 typedef struct ep_full_contact {
   const ep_mesh *mesh;
   int count;
-  int *vertex;                 // (count) on the surface
+  int *vertex;                 // (count) on the surface, not held
   double *area;                // (count)
   double unit, diagonal;       // as ep_contact_choose
   double *start, *lag, *ahead; // (3n) displacements: step's start, normal forces, free flight
