@@ -7,6 +7,7 @@
 #include "app/compare.h"
 #include "app/quality_json.h"
 #include "app/report.h"
+#include "app/stress.h"
 
 // ---- bake ------------------------------------------------------------------------------------
 
@@ -61,6 +62,9 @@ int main(int argc, char **argv) {
     break;
   case EP_COMMAND_COMPARE:
     status = ep_command_compare(&cli, &err);
+    break;
+  case EP_COMMAND_STRESS:
+    status = ep_command_stress(&cli, &err);
     break;
   case EP_COMMAND_ALIGN:
   case EP_COMMAND_BAKE:

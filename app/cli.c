@@ -16,6 +16,7 @@ static const char general_help[] =
     "  compare  measure methods and settings of a scene against the full space\n"
     "  report one page of the runs of many scenes, figure by figure\n"
     "  bake   prepare a scene: poses, basis, cubature, model; kept in the cache\n"
+    "  stress  push a scene far beyond what it was made for, and report what stays sound\n"
     "  plan   say which stages a scene needs, and why the others are left out\n"
     "  align  map the examples of a scene to its object and judge the maps\n"
     "  eigen  Laplace-Beltrami eigenvalues and eigenfunctions of a tet mesh\n"
@@ -34,7 +35,9 @@ enum {
   KEY_JSON = 'j',
   KEY_SET = 'S',
   KEY_CACHE = 'c',
-  KEY_SERVED = 0x100
+  KEY_SERVED = 0x100,
+  KEY_QUICK,
+  KEY_REPLAY
 };
 
 #define OPTION_JSON                                                                                \
@@ -89,6 +92,17 @@ static const struct argp_option run_options[] = {
     OPTION_CACHE,
     {0}};
 
+static const struct argp_option stress_options[] = {
+    {"out", KEY_OUT, "DIR", 0, "Folder of the report (default: out/NAME-stress)", 0},
+    {"quick", KEY_QUICK, 0, 0, "Only the ends of every axis, only the scene itself", 0},
+    {"replay", KEY_REPLAY, "FILE", 0, "Do the step of a failure (DIR/failures/*.json) once more",
+     0},
+    OPTION_JSON,
+    OPTION_QUIET,
+    OPTION_SET,
+    OPTION_CACHE,
+    {0}};
+
 static const struct {
   const char *name, *args, *doc;
   const struct argp_option *options;
@@ -112,6 +126,11 @@ static const struct {
                             "Finished points are kept in the cache: an interrupted sweep goes on "
                             "where it stopped.",
                             run_options},
+    [EP_COMMAND_STRESS] = {"stress", "SCENE",
+                           "Push a scene far beyond what it was made for - stiffness, time step, "
+                           "loads, start states, materials - and report what stays sound. A "
+                           "failing state is kept to be done again.",
+                           stress_options},
     [EP_COMMAND_REPORT] = {"report", "FIGURES",
                            "Make one page of many runs: FIGURES (JSON, as data/figures.json) lists "
                            "figures and the scenes that show them; each scene's results are looked "
@@ -155,6 +174,12 @@ static error_t take(int key, char *arg, struct argp_state *state) {
     return 0;
   case KEY_QUIET:
     cli->quiet = true;
+    return 0;
+  case KEY_QUICK:
+    cli->quick = true;
+    return 0;
+  case KEY_REPLAY:
+    cli->replay = arg;
     return 0;
   case KEY_SERVED:
     cli->served = true;

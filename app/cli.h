@@ -17,6 +17,7 @@ typedef enum ep_command {
   EP_COMMAND_BAKE,
   EP_COMMAND_RUN,
   EP_COMMAND_COMPARE,
+  EP_COMMAND_STRESS,
   EP_COMMAND_REPORT,
   EP_COMMANDS
 } ep_command;
@@ -27,6 +28,8 @@ typedef struct ep_cli {
   const char *out, *cache;
   int count; // eigen: eigenpairs wanted
   bool json, quiet;
+  bool quick;         // stress: only the ends of every axis
+  const char *replay; // stress: a failure's file
   bool served; // run by the command, which reports in its place what both would say
   int nsets;
   const char *set[EP_SETS_MAX];
