@@ -302,7 +302,10 @@ static ep_status write_model(ep_bake *bake, const char *path, ep_error *err) {
       .green = bake->green.b ? &bake->green : NULL,
       .cubic = bake->cubic,
       .contact = tree.contacts ? &tree : NULL,
-      .precision = bake->scene->evaluator == EP_EVALUATE_CUBIC_FLOAT ? EP_FLOAT : EP_DOUBLE,
+      .precision = bake->scene->evaluator == EP_EVALUATE_CUBIC_FLOAT ||
+                           bake->scene->evaluator == EP_EVALUATE_CUBATURE_FLOAT
+                       ? EP_FLOAT
+                       : EP_DOUBLE,
   };
   ep_model_memory memory;
   const ep_status built = ep_model_build(&parts, &memory, err);

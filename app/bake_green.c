@@ -25,7 +25,7 @@ static ep_status quadrature(const ep_bake *bake, double **out, ep_error *err) {
   const ep_cubature *c = &bake->cubature;
   *out = calloc((size_t)bake->shapes->shape[0].mesh.nt, sizeof **out);
   if (!*out) return ep_fail(err, EP_ERR_MEMORY, "no memory for element weights");
-  const bool exact = bake->scene->evaluator != EP_EVALUATE_CUBATURE;
+  const bool exact = !ep_is_cubature(bake->scene->evaluator);
   if (exact) memcpy(*out, bake->fem.volume, (size_t)bake->fem.mesh->nt * sizeof **out);
   for (int i = 0; i < c->count && !exact; i++) (*out)[c->tet[i]] += c->weight[i];
   return EP_OK;

@@ -14,7 +14,7 @@
 static const int stage_version[] = {
     [EP_STAGE_EIGEN] = 1, [EP_STAGE_MAP] = 3,   [EP_STAGE_POSES] = 3,    [EP_STAGE_MODES] = 1,
     [EP_STAGE_PATHS] = 2, [EP_STAGE_BASIS] = 1, [EP_STAGE_CUBATURE] = 1, [EP_STAGE_GREEN] = 1,
-    [EP_STAGE_MODEL] = 4, [EP_STAGE_CUBIC] = 1, [EP_STAGE_TARGET] = 1,   [EP_STAGE_CONTACT] = 1,
+    [EP_STAGE_MODEL] = 5, [EP_STAGE_CUBIC] = 1, [EP_STAGE_TARGET] = 1,   [EP_STAGE_CONTACT] = 1,
     [EP_STAGE_FRAME] = 1,
 };
 
@@ -337,7 +337,7 @@ static bool uses_descriptors(const planner *p) {
 }
 
 static bool is_cubic(const planner *p) {
-  return p->scene->evaluator != EP_EVALUATE_CUBATURE;
+  return !ep_is_cubature(p->scene->evaluator);
 }
 
 static void plan_cubature(planner *p) {
@@ -405,7 +405,8 @@ static void plan_model(planner *p) {
   add_sets(p, &text);
   add_stage_key(p, &text, EP_STAGE_GREEN);
   add_stage_key(p, &text, EP_STAGE_CUBIC);
-  if (is_cubic(p)) ep_hash_add(&text, "evaluator %d", (int)p->scene->evaluator);
+  if (p->scene->evaluator != EP_EVALUATE_CUBATURE)
+    ep_hash_add(&text, "evaluator %d", (int)p->scene->evaluator);
   if (p->scene->nobstacles) ep_hash_add(&text, "contact");
   stage->key = ep_hash_done(&text);
 }

@@ -89,12 +89,9 @@ static ep_status read_simulation(const ep_scene_reader *r, const raw_simulation 
   const raw_simulation none = {0}, *raw = given ? given : &none;
   const raw_damping undamped = {0}, *damping = raw->damping ? raw->damping : &undamped;
   out->integrator = raw->integrator ? (ep_integrator)*raw->integrator : EP_IMPLICIT_EULER;
-  if (raw->precision && (ep_precision)*raw->precision == EP_FLOAT) {
-    if (out->evaluator != EP_EVALUATE_CUBIC)
-      return ep_read_refuse(r, "simulation.precision",
-                            "float is for the cubic polynomials; give reduction.evaluator: cubic");
-    out->evaluator = EP_EVALUATE_CUBIC_FLOAT;
-  }
+  if (raw->precision && (ep_precision)*raw->precision == EP_FLOAT)
+    out->evaluator =
+        ep_is_cubature(out->evaluator) ? EP_EVALUATE_CUBATURE_FLOAT : EP_EVALUATE_CUBIC_FLOAT;
   EP_TRY(ep_read_number(r, "simulation.dt", raw->dt, 1.0 / 60, 1e-6, 1, &out->dt));
   EP_TRY(ep_read_whole(r, "simulation.steps", raw->steps, 120, 1, 1000000, &out->steps));
   // Damping by mass is a drag against the still world: free objects fly undamped unless told.
@@ -176,7 +173,7 @@ static ep_status check_local(const ep_scene_reader *r, const ep_scene *scene) {
   if (scene->force == EP_EXAMPLE_LINEAR)
     return ep_read_refuse(r, "examples.force",
                           "linear pulls the whole object; examples with a region need energy");
-  if (scene->relief > 0 && scene->evaluator != EP_EVALUATE_CUBATURE)
+  if (scene->relief > 0 && !ep_is_cubature(scene->evaluator))
     return ep_read_refuse(r, "examples.relief",
                           "exact polynomials cannot leave out a part of the object; with examples "
                           "of a region use reduction.evaluator: cubature, or relief: 0");

@@ -33,13 +33,19 @@ typedef struct ep_model_sizes {
 
 // How the elastic energy of a step is evaluated: by cubature (any material), or exactly by cubic
 // polynomials (StVK; reduced/cubic.h) in doubles or floats. With EP_STVK_VOLUME the polynomial
-// carries the penalty of the cubature elements beside it. Floats: residuals below 1e-5 are
-// round-off.
+// carries the penalty of the cubature elements beside it. Floats: of polynomials, residuals below
+// 1e-5 are round-off; of cubature, energy and force are those of a model whose G is rounded to
+// floats (6e-8), in doubles, and the stiffness is right to 1e-6: Newton converges as with doubles.
 typedef enum ep_evaluator {
   EP_EVALUATE_CUBATURE,
   EP_EVALUATE_CUBIC,
-  EP_EVALUATE_CUBIC_FLOAT
+  EP_EVALUATE_CUBIC_FLOAT,
+  EP_EVALUATE_CUBATURE_FLOAT
 } ep_evaluator;
+
+static inline int ep_is_cubature(ep_evaluator evaluator) {
+  return evaluator == EP_EVALUATE_CUBATURE || evaluator == EP_EVALUATE_CUBATURE_FLOAT;
+}
 
 // All arrays are borrowed from the bytes the model was opened in (or from a baker's memory).
 typedef struct ep_model {
@@ -64,6 +70,10 @@ ep_status ep_model_open(const void *bytes, size_t size, ep_model *model, char *m
 // F; out (s x blocks x 72), blocks = ceil(r / 8), i.e. ep_packed_cubature_size(r, s) doubles.
 size_t ep_packed_cubature_size(int r, int s);
 void ep_pack_cubature(int r, int s, const double *g, double *out);
+// The same for cubature_g_float: (s x 9 x 16 ceil(r / 16)), modes beyond r zero. EP_ERR_NUMERIC
+// where a number does not fit a float.
+size_t ep_packed_cubature_float_size(int r, int s);
+ep_status ep_pack_cubature_float(int r, int s, const double *g, float *out);
 // The layout of green_b, one matrix: b (r x r) symmetric, row-major; out ep_packed_green_size(r)
 // doubles: the lower triangle in 8 x 8 tiles, half the diagonal (reduced/green.h).
 size_t ep_packed_green_size(int r);

@@ -14,6 +14,7 @@ static void run_kernel(ep_state *state, ep_material material, int terms, const d
   const ep_model *m = state->model;
   const int r = m->size.r;
   memcpy(state->padded_q, q, (size_t)r * sizeof *q); // its tail stays zero
+  const int in_floats = m->evaluator == EP_EVALUATE_CUBATURE_FLOAT;
   ep_kernel_task task = {.r = r,
                          .s = m->size.s,
                          .blocks = m->size.blocks,
@@ -27,7 +28,8 @@ static void run_kernel(ep_state *state, ep_material material, int terms, const d
                          .f = want_f ? state->padded_f : NULL,
                          .k = want_k ? state->padded_k : NULL,
                          .project = project,
-                         .scratch = state->kernel_scratch};
+                         .scratch = state->kernel_scratch,
+                         .g_float = in_floats ? m->cubature_g_float : NULL};
   state->kernel(&task);
 }
 
@@ -81,7 +83,7 @@ double ep_cubic_add(ep_state *state, double scale, const double *q, double *f, d
 
 double ep_elastic_energy(ep_state *state, const double *q, double *f, double *k, int project) {
   const size_t r = (size_t)state->model->size.r;
-  if (state->model->evaluator != EP_EVALUATE_CUBATURE) {
+  if (!ep_is_cubature(state->model->evaluator)) {
     if (f) memset(f, 0, r * sizeof *f);
     if (k) memset(k, 0, r * r * sizeof *k);
     return ep_cubic_add(state, 1, q, f, k, project);

@@ -20,7 +20,10 @@ ep_kernel ep_kernel_select(const char **name) {
   return ep_kernel_baseline;
 }
 
-// Tangents of 8 elements (81 lanes), their products with G (8 x blocks x 9 lanes).
-int ep_kernel_scratch(int blocks) {
+// Tangents of 8 elements (81 lanes), their products with G (8 x blocks x 9 lanes); for floats also
+// the stiffness, all in rows of 16.
+int ep_kernel_scratch(int blocks, int floats) {
+  const int row = (blocks + 1) / 2 * 16;
+  if (floats) return 81 * EP_LANES + (row + 9 * EP_LANES) * row / 2;
   return (81 + EP_LANES * 9 * blocks) * EP_LANES;
 }

@@ -30,13 +30,15 @@ typedef struct ep_kernel_task {
   double *f;       // (8 blocks) out, or NULL
   double *k;       // (8 blocks x 8 blocks) out, symmetric, or NULL
   int project;     // element tangents projected to positive semidefinite
-  double *scratch; // ep_kernel_scratch(blocks) doubles, 64-byte aligned
+  double *scratch; // ep_kernel_scratch doubles, 64-byte aligned
+  // In place of g: floats as packed by ep_pack_cubature_float (kernel_float_body.h); or NULL.
+  const float *g_float;
 } ep_kernel_task;
 
 typedef void (*ep_kernel)(ep_kernel_task *task);
 
-// Doubles of scratch memory for one evaluation.
-int ep_kernel_scratch(int blocks);
+// Doubles of scratch memory for one evaluation, with G in doubles or floats.
+int ep_kernel_scratch(int blocks, int floats);
 
 void ep_kernel_baseline(ep_kernel_task *task); // x86-64 (SSE2) or whatever the target is
 #if defined(__x86_64__)

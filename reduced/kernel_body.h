@@ -17,6 +17,8 @@ enum { TILE_ROWS = 8, TILE_COLUMNS = 2 };
 enum { TILE_ROWS = 4, TILE_COLUMNS = 1 };
 #endif
 
+#include "reduced/kernel_float_body.h"
+
 // Gather one number of 8 elements; beyond s the value `beyond`.
 LANE_INLINE lane gather(const double *x, int stride, int first, int s, double beyond) {
   lane out;
@@ -31,7 +33,9 @@ static void deformation_gradients(const ep_kernel_task *t, int first, lane f[9])
   for (int e = 0; e < EP_LANES; e++) {
     lane row[9];
     for (int c = 0; c < 9; c++) row[c] = lane_all(0);
-    if (first + e < t->s) {
+    if (first + e < t->s && t->g_float) {
+      narrow_rows(t, first + e, row);
+    } else if (first + e < t->s) {
       const lane *g = (const lane *)t->g + (size_t)(first + e) * (size_t)t->blocks * 9;
       for (int b = 0; b < t->blocks; b++)
         for (int c = 0; c < 9; c++) row[c] += g[9 * b + c] * q[b];
@@ -189,6 +193,9 @@ static void mirror(int n, double *k) {
 void EP_KERNEL(ep_kernel_task *t) {
   const size_t width = 8 * (size_t)t->blocks;
   lane *tangent = t->k ? (lane *)t->scratch : NULL, *product = (lane *)t->scratch + 81;
+  narrow *k = (narrow *)product; // in floats, followed by the products
+  if (t->k && t->g_float)
+    memset(k, 0, (size_t)narrow_row(t) * (size_t)narrow_row(t) * sizeof(float));
   if (t->f) memset(t->f, 0, width * sizeof *t->f);
   if (t->k) memset(t->k, 0, width * width * sizeof *t->k);
   for (int i = 0; i < t->terms; i++) t->term[i].energy = 0;
@@ -204,12 +211,18 @@ void EP_KERNEL(ep_kernel_task *t) {
       add_term(t, &t->term[i], first, f, &energy, stress, tangent);
       t->term[i].energy += lane_sum(energy);
     }
-    if (t->f) add_force(t, first, stress);
+    if (t->f && t->g_float) narrow_force(t, first, stress);
+    if (t->f && !t->g_float) add_force(t, first, stress);
     if (!t->k) continue;
     if (t->project) project_tangents(tangent);
+    if (t->g_float) {
+      narrow_stiffness(t, first, tangent, k);
+      continue;
+    }
     tangent_times_modes(t, first, tangent, product);
     add_stiffness(t, first, product);
   }
   for (int i = 0; i < t->terms; i++) t->term[i].energy *= t->term[i].scale;
-  if (t->k) mirror((int)width, t->k);
+  if (t->k && t->g_float) narrow_finish(t, (const float *)k);
+  if (t->k && !t->g_float) mirror((int)width, t->k);
 }

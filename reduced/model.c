@@ -85,6 +85,8 @@ static ep_status read_sizes(const ep_tensorfile *file, ep_model_sizes *z, char *
   if ((z->cubic && (size_t)z->cubic != ep_cubic_stream_size(z->r, EP_DOUBLE)) ||
       (z->cubic_float && (size_t)z->cubic_float != ep_cubic_stream_size(z->r, EP_FLOAT)))
     return ep_text_refuse(message, "the cubic coefficients are not those of r modes");
+  if (z->cubature_float && z->cubature_float != z->s)
+    return ep_text_refuse(message, "impossible sizes: cubature_float is neither 0 nor s");
   if (z->s < 1 && (z->m > 0 || !(z->cubic || z->cubic_float)))
     return ep_text_refuse(message, "impossible sizes: without cubature elements (s = 0) there must "
                                    "be cubic coefficients and no descriptors");
@@ -194,6 +196,7 @@ static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *m
   const int n = model->size.n, nt = model->size.nt, r = model->size.r, m = model->size.m;
   const int k = model->size.k, s = model->size.s, blocks = model->size.blocks;
   const int greens = model->size.greens, cubic = model->size.cubic;
+  const int cubature_float = model->size.cubature_float;
   const int cubic_float = model->size.cubic_float, rigid = model->size.rigid;
   const int contacts = model->size.contacts, nodes = model->size.nodes;
   const int regions = model->size.regions;
@@ -244,21 +247,23 @@ static ep_status read_scale(const ep_tensorfile *file, double *scale, char *mess
 
 ep_evaluator ep_model_best_evaluator(const ep_model *model) {
   if (model->size.cubic) return EP_EVALUATE_CUBIC;
-  return model->size.cubic_float ? EP_EVALUATE_CUBIC_FLOAT : EP_EVALUATE_CUBATURE;
+  if (model->size.cubic_float) return EP_EVALUATE_CUBIC_FLOAT;
+  return model->size.cubature_float ? EP_EVALUATE_CUBATURE_FLOAT : EP_EVALUATE_CUBATURE;
 }
 
 ep_status ep_model_check_evaluator(const ep_model *model, char *message) {
   const int stvk = model->material == EP_STVK || model->material == EP_STVK_VOLUME;
-  if (model->evaluator == EP_EVALUATE_CUBATURE && model->size.s < 1)
+  if (ep_is_cubature(model->evaluator) && model->size.s < 1)
     return ep_text_refuse(message, "the model has no cubature elements");
+  if (model->evaluator == EP_EVALUATE_CUBATURE_FLOAT && !model->size.cubature_float)
+    return ep_text_refuse(message, "the model has no cubature in floats");
   if (model->evaluator == EP_EVALUATE_CUBIC && !model->size.cubic)
     return ep_text_refuse(message, "the model has no cubic coefficients in doubles");
   if (model->evaluator == EP_EVALUATE_CUBIC_FLOAT && !model->size.cubic_float)
     return ep_text_refuse(message, "the model has no cubic coefficients in floats");
-  if (model->evaluator != EP_EVALUATE_CUBATURE && !stvk)
+  if (!ep_is_cubature(model->evaluator) && !stvk)
     return ep_text_refuse(message, "cubic coefficients with a material other than stvk");
-  if (model->evaluator != EP_EVALUATE_CUBATURE && model->material == EP_STVK_VOLUME &&
-      model->size.s < 1)
+  if (!ep_is_cubature(model->evaluator) && model->material == EP_STVK_VOLUME && model->size.s < 1)
     return ep_text_refuse(message, "the volume penalty needs cubature elements");
   return EP_OK;
 }

@@ -15,8 +15,8 @@
 #define EP_MODEL_SIZES(X)                                                                          \
   X(n)                                                                                             \
   X(nt)                                                                                            \
-  X(r) X(m) X(k) X(regions) X(s) X(blocks) X(greens) X(cubic) X(cubic_float) X(rigid) X(contacts)  \
-      X(nodes)
+  X(r) X(m) X(k) X(regions) X(s) X(blocks) X(greens) X(cubic) X(cubic_float) X(cubature_float)     \
+      X(rigid) X(contacts) X(nodes)
 
 // clang-format off
 #define EP_MODEL_ARRAYS(X)                                                                        \
@@ -40,6 +40,9 @@
   /* F_j = I + sum_a q_a G_j,a: lanes of 8 modes, [element][block][9 entries of F][8 modes], */    \
   /* modes beyond r zero. Filled by ep_pack_cubature alone: no one else knows this layout */       \
   X(double, cubature_g,    s, blocks, 72)                                                         \
+  /* the same in floats: [element][9 entries of F][modes, in sixteens]; what else is evaluated at */ \
+  /* these elements (penalty, scales, targets at rest) reads the doubles */                         \
+  X(float,  cubature_g_float, cubature_float, 9, 16 * ((r + 15) / 16))                            \
   /* per example, per cubature element: inverse of F_i (row-major 9) and w |det F_i| */           \
   X(double, example_finv,  m ? k : 0, s, 9)                                                       \
   X(double, example_w,     m ? k : 0, s, 1)                                                       \

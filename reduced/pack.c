@@ -1,6 +1,9 @@
+#include <math.h>
 #include <string.h>
 
 #include "reduced/eigenpose.h"
+
+static const double largest_float = 3.4e38, smallest_float = 1.2e-38;
 
 size_t ep_packed_cubature_size(int r, int s) {
   return (size_t)s * (size_t)((r + 7) / 8) * 72;
@@ -13,6 +16,23 @@ void ep_pack_cubature(int r, int s, const double *g, double *out) {
     for (size_t entry = 0; entry < 9; entry++)
       for (size_t a = 0; a < modes; a++)
         out[((e * blocks + a / 8) * 9 + entry) * 8 + a % 8] = g[(9 * e + entry) * modes + a];
+}
+
+size_t ep_packed_cubature_float_size(int r, int s) {
+  return (size_t)s * 9 * (size_t)((r + 15) / 16 * 16);
+}
+
+ep_status ep_pack_cubature_float(int r, int s, const double *g, float *out) {
+  const size_t modes = (size_t)r, row = (size_t)((r + 15) / 16 * 16);
+  memset(out, 0, ep_packed_cubature_float_size(r, s) * sizeof *out);
+  for (size_t i = 0; i < 9 * (size_t)s; i++)
+    for (size_t a = 0; a < modes; a++) {
+      const double x = g[i * modes + a];
+      if (!(fabs(x) <= largest_float)) return EP_ERR_NUMERIC;
+      // what a float has no normal form for is nothing beside the others, and slow
+      out[i * row + a] = fabs(x) < smallest_float ? 0 : (float)x;
+    }
+  return EP_OK;
 }
 
 size_t ep_packed_green_size(int r) {

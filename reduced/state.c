@@ -17,12 +17,13 @@ static ep_precision precision_of(const ep_model *model) {
 static size_t lay_out(const ep_model *model, char *memory, ep_state *state) {
   const size_t r = (size_t)model->size.r, m = (size_t)model->size.m, k = (size_t)model->size.k;
   const size_t s = (size_t)model->size.s, width = 8 * (size_t)model->size.blocks;
+  const int floats = model->evaluator == EP_EVALUATE_CUBATURE_FLOAT;
   const size_t greens = (size_t)model->size.greens, contacts = (size_t)model->size.contacts;
   const size_t regions = (size_t)model->size.regions, sets = (size_t)ep_model_regions(model);
   const size_t free = model->size.rigid ? r : 0, n = model->size.rigid ? r + 6 : r;
   const size_t examples = k > 0 && m > 0; // without descriptors their scratch is left out
   const size_t cubic_words =
-      model->evaluator == EP_EVALUATE_CUBATURE
+      ep_is_cubature(model->evaluator)
           ? 0
           : ep_cubic_scratch(model->size.r, precision_of(model)) / sizeof(double);
   size_t used = rounded(sizeof *state);
@@ -77,7 +78,7 @@ ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_st
   const int narrow = model->evaluator == EP_EVALUATE_CUBIC_FLOAT;
   if (narrow) state->energy_noise = 2e-6, state->force_noise = 1e-5;
   const void *stream = narrow ? (const void *)model->cubic_stream_float : model->cubic_stream;
-  if (model->evaluator != EP_EVALUATE_CUBATURE &&
+  if (!ep_is_cubature(model->evaluator) &&
       ep_cubic_open(model->size.r, precision_of(model), stream, &state->cubic) != EP_OK)
     return EP_ERR_ARGUMENT;
   measure_scales(state);

@@ -28,7 +28,7 @@
   X(padded_q, width)       /* what the kernels read and write */                                  \
   X(padded_f, width)                                                                              \
   X(padded_k, width * width)                                                                      \
-  X(kernel_scratch, ep_kernel_scratch((int)(width / 8)))                                          \
+  X(kernel_scratch, ep_kernel_scratch((int)(width / 8), floats))                                  \
   X(x, n)                  /* Newton: point, gradient, direction, trial, Hessian, its factor */   \
   X(g, n)                                                                                         \
   X(direction, n)                                                                                 \

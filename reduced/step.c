@@ -58,7 +58,7 @@ static double inner_energy(ep_step_run *s, const double *x, double *g, double *h
   ep_state *state = s->state;
   const ep_step_def *def = s->def;
   const int as_energy = s->examples && def->example_force == EP_EXAMPLE_ENERGY;
-  const int by_cubature = state->model->evaluator == EP_EVALUATE_CUBATURE;
+  const int by_cubature = ep_is_cubature(state->model->evaluator);
   const double kept = s->examples ? 1 - def->relief : 1;
   const double share = (s->kept_weight ? 1 : kept) * ep_green_share(state->model, &def->green);
   ep_green green = def->green; // shares what relief leaves, or the sum would have no lower bound
@@ -281,7 +281,7 @@ static int suits_regions(const ep_model *m, const ep_step_def *def) {
   for (int g = 0; def->region_strength && g < m->size.regions; g++)
     if (!(def->region_strength[g] >= 0) || !isfinite(def->region_strength[g])) return 0;
   return def->example_force == EP_EXAMPLE_ENERGY &&
-         (def->relief == 0 || m->evaluator == EP_EVALUATE_CUBATURE);
+         (def->relief == 0 || ep_is_cubature(m->evaluator));
 }
 
 // Relief of regions: the share of an element that some region with strength takes.

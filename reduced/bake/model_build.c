@@ -72,9 +72,9 @@ static ep_status allocate(builder *b, ep_model_memory *out, ep_error *err) {
   const ep_model_sizes *z = &b->size;
   int n = z->n, nt = z->nt, r = z->r, m = z->m, k = z->k, s = z->s, blocks = z->blocks;
   int greens = z->greens, cubic = z->cubic, cubic_float = z->cubic_float, rigid = z->rigid;
-  int regions = z->regions;
+  int regions = z->regions, cubature_float = z->cubature_float;
   (void)n, (void)nt, (void)r, (void)m, (void)k, (void)s, (void)blocks, (void)greens, (void)cubic,
-      (void)cubic_float, (void)rigid, (void)regions;
+      (void)cubic_float, (void)rigid, (void)regions, (void)cubature_float;
   const int contacts = z->contacts, nodes = z->nodes;
 #define X(type, name, d1, d2, d3)                                                                  \
   if ((size_t)(d1) * (size_t)(d2) * (size_t)(d3) > 0) {                                            \
@@ -214,7 +214,7 @@ static void example_at_element(builder *b, int example, int j, const double *g) 
                         b->parts->tet[j]);
 }
 
-static void fill_cubature(builder *b, double *g) {
+static ep_status fill_cubature(builder *b, double *g, ep_error *err) {
   const ep_model_parts *p = b->parts;
   for (int j = 0; j < p->s; j++) {
     double *gj = g + (size_t)j * 9 * (size_t)b->size.r;
@@ -226,15 +226,22 @@ static void fill_cubature(builder *b, double *g) {
     for (int i = 0; b->size.m > 0 && i < b->size.k; i++) example_at_element(b, i, j, gj);
   }
   ep_pack_cubature(b->size.r, b->size.s, g, b->a.cubature_g);
+  if (b->size.cubature_float &&
+      ep_pack_cubature_float(b->size.r, b->size.s, g, b->a.cubature_g_float) != EP_OK)
+    return ep_fail(
+        err, EP_ERR_NUMERIC,
+        "the deformation gradients of the modes do not fit floats: use double precision, "
+        "or units nearer to the object's size");
+  return EP_OK;
 }
 
 static ep_status build_cubature(builder *b, ep_error *err) {
   if (b->size.s == 0) return EP_OK;
   double *g = malloc((size_t)b->size.s * 9 * (size_t)b->size.r * sizeof *g);
   if (!g) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d cubature elements", b->size.s);
-  fill_cubature(b, g);
+  const ep_status status = fill_cubature(b, g, err);
   free(g);
-  return EP_OK;
+  return status;
 }
 
 static void fill_green(builder *b) {
@@ -340,6 +347,7 @@ static ep_model_sizes sizes_of(const ep_model_parts *p) {
                           .greens = p->green ? p->green->count : 0,
                           .cubic = cubic_size(p, EP_DOUBLE),
                           .cubic_float = cubic_size(p, EP_FLOAT),
+                          .cubature_float = !p->cubic && p->precision == EP_FLOAT ? p->s : 0,
                           .contacts = p->contact ? p->contact->contacts : 0,
                           .nodes = p->contact ? p->contact->nodes : 0,
                           .rigid = ep_fem_is_free(p->fem)};
@@ -368,9 +376,11 @@ ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_e
   // With the model's own function: that of a region may not be linear in q.
   for (int i = 0; b.size.m > 0 && i < b.size.k; i++)
     ep_descriptor(&out->model, b.a.example_q + i * b.size.r, b.a.example_c + i * 3 * b.size.m);
-  out->model.evaluator = !parts->cubic                   ? EP_EVALUATE_CUBATURE
-                         : parts->precision == EP_DOUBLE ? EP_EVALUATE_CUBIC
-                                                         : EP_EVALUATE_CUBIC_FLOAT;
+  const int floats = parts->precision == EP_FLOAT;
+  if (parts->cubic)
+    out->model.evaluator = floats ? EP_EVALUATE_CUBIC_FLOAT : EP_EVALUATE_CUBIC;
+  else
+    out->model.evaluator = floats ? EP_EVALUATE_CUBATURE_FLOAT : EP_EVALUATE_CUBATURE;
   return EP_OK;
 fail:
   ep_model_memory_free(out);

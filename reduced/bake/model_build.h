@@ -27,7 +27,7 @@ typedef struct ep_model_parts {
   const double *weight;  // (s) absolute volumes, >= 0
   const ep_green_coefficients *green; // of the Green-strain path, NULL: not used
   const double *cubic;                // (ep_cubic_count(r)) exact StVK coefficients, NULL: not used
-  ep_precision precision;             // of the cubic stream in the model
+  ep_precision precision;             // of the model's evaluator: polynomials, else cubature
   const ep_contact_tree *contact;     // surface of the basis' mesh and modes, NULL: no obstacles
 } ep_model_parts;
 

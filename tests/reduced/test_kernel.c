@@ -84,7 +84,8 @@ static void levels_give_the_same_bits(void **state) {
   for (int material = 0; material < EP_MATERIALS; material++) {
     bar *b = bar_create(4, 2, 1, 30, 45, 4, 2, material);
     const size_t words = 32 + 32 * 32 + 32;
-    double *memory = aligned_alloc(64, sizeof(double) * ((size_t)ep_kernel_scratch(4) + 4 * words));
+    double *memory =
+        aligned_alloc(64, sizeof(double) * ((size_t)ep_kernel_scratch(4, 0) + 4 * words));
     assert_non_null(memory);
     double *q = memory, *scratch = memory + 4 * words;
     for (int a = 0; a < 32; a++) q[a] = 0;
@@ -108,7 +109,8 @@ static void levels_give_the_same_bits(void **state) {
                              f,
                              f + 32,
                              0,
-                             scratch};
+                             scratch,
+                             NULL};
       kernels[i](&task);
       energy[i][0] = term[0].energy, energy[i][1] = term[1].energy;
       assert_memory_equal(f, memory + words, (32 + 32 * 32) * sizeof(double));

@@ -46,7 +46,7 @@ static void same_arrays(const ep_model *x, const ep_model *y) {
   const int n = x->size.n, nt = x->size.nt, r = x->size.r, m = x->size.m;
   const int k = x->size.k, s = x->size.s, blocks = x->size.blocks, greens = x->size.greens;
   const int cubic = x->size.cubic, cubic_float = x->size.cubic_float;
-  const int rigid = x->size.rigid;
+  const int rigid = x->size.rigid, cubature_float = x->size.cubature_float;
   const int contacts = x->size.contacts, nodes = x->size.nodes;
   const int regions = x->size.regions;
 #define SAME(type, name, d1, d2, d3)                                                               \
