@@ -61,18 +61,27 @@ static void add_sphere(body *b, double radius) {
   }
 }
 
-// A slab under the plane, around the middle of what is shown.
+// A slab under the plane, as wide as what is shown.
 static void add_plane(body *b, const ep_scene_obstacle *o, const double low[3],
                       const double high[3]) {
-  double middle[3], local[3], square = 0;
-  for (int i = 0; i < 3; i++) {
-    middle[i] = 0.5 * (low[i] + high[i]);
-    square += (high[i] - low[i]) * (high[i] - low[i]);
+  double from[3] = {INFINITY, INFINITY, 0}, to[3] = {-INFINITY, -INFINITY, 0}, square = 0;
+  for (int i = 0; i < 3; i++) square += (high[i] - low[i]) * (high[i] - low[i]);
+  for (int corner = 0; corner < 8; corner++) {
+    const double x[3] = {corner & 1 ? high[0] : low[0], corner & 2 ? high[1] : low[1],
+                         corner & 4 ? high[2] : low[2]};
+    double local[3];
+    ep_obstacle_to_local(&o->at, x, local);
+    for (int i = 0; i < 2; i++) {
+      from[i] = fmin(from[i], local[i]);
+      to[i] = fmax(to[i], local[i]);
+    }
   }
-  const double half = 0.6 * sqrt(square);
-  ep_obstacle_to_local(&o->at, middle, local);
-  const double from[3] = {local[0] - half, local[1] - half, -0.04 * half};
-  const double to[3] = {local[0] + half, local[1] + half, 0};
+  const double margin = 0.06 * sqrt(square);
+  for (int i = 0; i < 2; i++) {
+    from[i] -= margin;
+    to[i] += margin;
+  }
+  from[2] = -0.02 * sqrt(square);
   add_box(b, from, to);
 }
 

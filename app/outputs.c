@@ -4,13 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "app/obstacle_mesh.h"
+#include "app/strip.h"
 #include "mesh/io.h"
 #include "results/csv.h"
 #include "results/gltf.h"
-#include "results/picture.h"
 
-enum { PANELS = 6, PATH_SHORT = 64 };
+enum { PATH_SHORT = 64 };
 
 static ep_status no_memory(ep_error *err) {
   return ep_fail(err, EP_ERR_MEMORY, "no memory to write the results");
@@ -211,60 +210,6 @@ static ep_status write_glb(const char *folder, const ep_scene *scene, const ep_m
   return status;
 }
 
-// ---- picture ---------------------------------------------------------------------------------
-
-// Panels: rest, equally spaced moments, the end; then each example as the object would wear it.
-static ep_status write_png(const char *folder, const ep_scene *scene, const ep_mesh *mesh,
-                           const ep_model *model, const ep_record *record, const ep_solids *solids,
-                           ep_error *err) {
-  const int examples = model->size.k < 3 ? model->size.k : 3;
-  const int moments = record->rows < PANELS ? record->rows : PANELS;
-  const size_t n3 = 3 * (size_t)mesh->nv, r = (size_t)model->size.r;
-  char path[EP_PATH_MAX], label[PANELS + 3][PATH_SHORT];
-  ep_drawing drawing[2 * (PANELS + 3)];
-  ep_panel panel[PANELS + 3];
-  int triangles, *triangle = NULL, count = moments + examples;
-  const size_t solid3 = 3 * (size_t)solids->mesh.nv;
-  double *x = calloc((size_t)count * n3 + (size_t)moments * solid3, sizeof *x);
-  ep_status status = x ? ep_mesh_surface(mesh, &triangles, &triangle, err) : no_memory(err);
-  for (int i = 0; i < count && status == EP_OK; i++) {
-    const int row = moments > 1 ? i * (record->rows - 1) / (moments - 1) : 0;
-    double *at = x + (size_t)i * n3;
-    if (i < moments) {
-      ep_record_positions(model, record, row, at);
-      snprintf(label[i], sizeof label[i], "t = %.2f s", record->time[row]);
-    } else {
-      ep_positions(model, model->example_q + (size_t)(i - moments) * r, at);
-      snprintf(label[i], sizeof label[i], "example %d", i - moments + 1);
-    }
-    drawing[2 * i] = ep_default_drawing(mesh->nv, at, triangles, triangle);
-    if (i >= moments) {
-      const float tint[3] = {0.85f, 0.55f, 0.25f};
-      memcpy(drawing[2 * i].tint, tint, sizeof tint);
-    }
-    panel[i] = (ep_panel){.drawings = 1, .drawing = &drawing[2 * i], .label = label[i]};
-    if (i >= moments || !solids->triangles) continue;
-    double *there = x + (size_t)count * n3 + (size_t)i * solid3;
-    const float grey[3] = {0.72f, 0.72f, 0.70f};
-    ep_solids_place(scene, solids, record->time[row], there);
-    drawing[2 * i + 1] =
-        ep_default_drawing(solids->mesh.nv, there, solids->triangles, solids->triangle);
-    memcpy(drawing[2 * i + 1].tint, grey, sizeof grey);
-    panel[i].drawings = 2;
-  }
-  if (status == EP_OK) status = ep_path_join(folder, "strip.png", path, err);
-  if (status == EP_OK) {
-    ep_view view = ep_default_view();
-    view.shared = true;
-    view.columns = count > 4 ? (count + 1) / 2 : 0;
-    view.title = scene->name;
-    status = ep_picture_write(path, &view, count, panel, err);
-  }
-  free(triangle);
-  free(x);
-  return status;
-}
-
 // ---- tables ----------------------------------------------------------------------------------
 
 static ep_status write_csv(const char *folder, const ep_model *model, const ep_record *record,
@@ -322,7 +267,7 @@ ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_s
   if (status == EP_OK && (scene->formats & EP_FORMAT_GLB))
     status = write_glb(folder, scene, mesh, model, record, frames, row, &solids, err);
   if (status == EP_OK && (scene->formats & EP_FORMAT_PNG))
-    status = write_png(folder, scene, mesh, model, record, &solids, err);
+    status = ep_strip_write(folder, scene, mesh, model, record, &solids, err);
   ep_solids_free(&solids);
   free(row);
   return status;

@@ -8,7 +8,7 @@
 
 // Write what scene->formats asks for into `folder` (made if needed), plus trajectory.csv. A record
 // cut short by a failure is written as far as it goes.
-//   frames/frame-0000.vtu .. and animation.pvd; animation.glb; strip.png
+//   frames/frame-0000.vtu .. and animation.pvd; animation.glb; strip.png, final.png
 ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_shapes *shapes,
                            const ep_model *model, const ep_record *record, ep_log *log,
                            ep_error *err);

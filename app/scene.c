@@ -195,6 +195,9 @@ static ep_status read_examples(const ep_scene_reader *r, const raw_examples *giv
 static ep_status read_output(const ep_scene_reader *r, const raw_output *raw, ep_scene *out) {
   EP_TRY(ep_read_whole(r, "output.every", raw ? raw->every : NULL, 2, 1, 1000000, &out->every));
   out->formats = EP_FORMAT_VTU | EP_FORMAT_GLB | EP_FORMAT_PNG;
+  for (unsigned i = 0; raw && i < raw->moments_count; i++)
+    EP_TRY(ep_read_number(r, "output.moments", &raw->moments[i], 0, 0, out->dt * (out->steps + 0.5),
+                          &out->moment[out->nmoments++]));
   if (!raw || !raw->formats) return EP_OK;
   out->formats = 0;
   for (unsigned i = 0; i < raw->formats_count; i++) out->formats |= (unsigned)raw->formats[i];

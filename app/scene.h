@@ -15,6 +15,7 @@ enum { EP_METHOD_LB = 1, EP_METHOD_GREEN = 2, EP_PATHS = 3 };
 // "lb", "green", "both"; "none" for 0.
 const char *ep_path_name(int methods);
 typedef enum ep_solver { EP_SOLVER_NLOPT, EP_SOLVER_NEWTON } ep_solver;
+enum { EP_MOMENTS_MAX = 24 };
 enum { EP_FORMAT_VTU = 1, EP_FORMAT_GLB = 2, EP_FORMAT_PNG = 4 }; // bits of ep_scene.formats
 
 typedef enum ep_select {
@@ -164,6 +165,8 @@ typedef struct ep_scene {
   ep_contact_def contact;
   int every;
   unsigned formats;
+  int nmoments; // of the strip; 0: equally spaced ones
+  double moment[EP_MOMENTS_MAX]; // [s]
   ep_sweep sweep;
 } ep_scene;
 

@@ -273,6 +273,7 @@ static const cyaml_schema_value_t format = {
 static const cyaml_schema_field_t output_fields[] = {
     NUMBER(raw_output, every),
     CYAML_FIELD_SEQUENCE("formats", OPTIONAL, raw_output, formats, &format, 0, 8),
+    CYAML_FIELD_SEQUENCE("moments", OPTIONAL, raw_output, moments, &number, 0, EP_MOMENTS_MAX),
     CYAML_FIELD_END,
 };
 

@@ -132,6 +132,8 @@ typedef struct raw_output {
   double *every;
   int *formats;
   unsigned formats_count;
+  double *moments;
+  unsigned moments_count;
 } raw_output;
 typedef struct raw_compare {
   double *modes, *elements, *dt;

@@ -142,16 +142,19 @@ ep_status ep_simulate(const ep_scene *scene, const ep_shapes *shapes, const ep_m
   return status;
 }
 
-void ep_record_positions(const ep_model *model, const ep_record *record, int row, double *x) {
-  ep_positions(model, record->q + (size_t)row * (size_t)model->size.r, x);
-  if (!record->frame) return;
-  const ep_frame *f = &record->frame[row];
+void ep_place(const ep_model *model, const ep_frame *frame, double *x) {
+  const double *c = frame->c, *R = frame->R;
   for (size_t v = 0; v < (size_t)model->size.n; v++) {
     double y[3];
     for (size_t i = 0; i < 3; i++) y[i] = x[3 * v + i] - model->rigid_origin[i];
     for (size_t i = 0; i < 3; i++)
-      x[3 * v + i] = f->c[i] + f->R[3 * i] * y[0] + f->R[3 * i + 1] * y[1] + f->R[3 * i + 2] * y[2];
+      x[3 * v + i] = c[i] + R[3 * i] * y[0] + R[3 * i + 1] * y[1] + R[3 * i + 2] * y[2];
   }
+}
+
+void ep_record_positions(const ep_model *model, const ep_record *record, int row, double *x) {
+  ep_positions(model, record->q + (size_t)row * (size_t)model->size.r, x);
+  if (record->frame) ep_place(model, &record->frame[row], x);
 }
 
 void ep_record_free(ep_record *record) {

@@ -37,6 +37,8 @@ ep_status ep_simulate(const ep_scene *scene, const ep_shapes *shapes, const ep_m
                       ep_log *log, ep_record *out, ep_error *err);
 void ep_record_free(ep_record *record);
 
+// Positions x (n x 3) of the model into the world, in place.
+void ep_place(const ep_model *model, const ep_frame *frame, double *x);
 // Positions in the world after a step (n x 3).
 void ep_record_positions(const ep_model *model, const ep_record *record, int row, double *x);
 
