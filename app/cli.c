@@ -17,6 +17,7 @@ static const char general_help[] =
     "  report one page of the runs of many scenes, figure by figure\n"
     "  bake   prepare a scene: poses, basis, cubature, model; kept in the cache\n"
     "  stress  push a scene far beyond what it was made for, and report what stays sound\n"
+    "  check  find what is wrong with meshes or scenes, say where and what to do; repair meshes\n"
     "  plan   say which stages a scene needs, and why the others are left out\n"
     "  align  map the examples of a scene to its object and judge the maps\n"
     "  eigen  Laplace-Beltrami eigenvalues and eigenfunctions of a tet mesh\n"
@@ -26,7 +27,8 @@ static const char general_help[] =
     "\n"
     "A first try: eigenpose run data/scenes/bar.yaml\n"
     "Exit codes: 0 done, 1 wrong use, 2 file not readable or writable, 3 file format,\n"
-    "4 unusable mesh, 5 scene, 6 bad map, 7 solver, 8 memory, 9 not supported.\n";
+    "4 unusable mesh, 5 scene, 6 bad map, 7 solver, 8 memory, 9 not supported,\n"
+    "10 check found errors.\n";
 
 enum {
   KEY_COUNT = 'n',
@@ -35,6 +37,8 @@ enum {
   KEY_JSON = 'j',
   KEY_SET = 'S',
   KEY_CACHE = 'c',
+  KEY_REPAIR = 'r',
+  KEY_LARGEST = 'l',
   KEY_SERVED = 0x100,
   KEY_QUICK,
   KEY_REPLAY
@@ -83,6 +87,16 @@ static const struct argp_option scene_options[] = {
     OPTION_SET,
     OPTION_CACHE,
     {"served", KEY_SERVED, 0, OPTION_HIDDEN, NULL, 0},
+    {0}};
+static const struct argp_option check_options[] = {
+    {"repair", KEY_REPAIR, "OUT", 0,
+     "Write the mesh repaired (.veg or .vtu): tets turned round, those without volume or repeated "
+     "left out, vertices in the same place joined",
+     0},
+    {"largest", KEY_LARGEST, 0, 0, "With --repair: keep the largest part only", 0},
+    OPTION_JSON,
+    OPTION_QUIET,
+    OPTION_SET,
     {0}};
 static const struct argp_option run_options[] = {
     {"out", KEY_OUT, "DIR", 0, "Folder of the results (default: out/NAME)", 0},
@@ -136,6 +150,12 @@ static const struct {
                            "figures and the scenes that show them; each scene's results are looked "
                            "for in DIR/SCENE.",
                            report_options},
+    [EP_COMMAND_CHECK] =
+        {"check", "FILE...",
+         "Find what is wrong with meshes, or with a scene and its meshes: a line for "
+         "each finding with its place and what to do, and a table. Exit code 10 "
+         "where errors are found; warnings do not fail.",
+         check_options},
     [EP_COMMAND_RUN] = {"run", "SCENE",
                         "Simulate a scene. Leaves the animation (.vtu/.pvd, .glb), a picture, the "
                         "trajectory and a summary in the folder of the results.",
@@ -169,6 +189,12 @@ static error_t take(int key, char *arg, struct argp_state *state) {
   case KEY_CACHE:
     cli->cache = arg;
     return 0;
+  case KEY_REPAIR:
+    cli->repair = arg;
+    return 0;
+  case KEY_LARGEST:
+    cli->largest = true;
+    return 0;
   case KEY_JSON:
     cli->json = true;
     return 0;
@@ -187,6 +213,9 @@ static error_t take(int key, char *arg, struct argp_state *state) {
   case KEY_SET:
     return take_set(cli, arg, state);
   case ARGP_KEY_ARG:
+    if (cli->ninputs == EP_INPUTS_MAX) argp_error(state, "more than %d files", EP_INPUTS_MAX);
+    cli->inputs[cli->ninputs++] = arg;
+    if (cli->command == EP_COMMAND_CHECK && cli->input) return 0;
     if (cli->input) argp_error(state, "one file is enough; '%s' is too much", arg);
     cli->input = arg;
     return 0;

@@ -8,7 +8,7 @@
 
 #define EP_VERSION "0.1.0"
 
-enum { EP_SETS_MAX = 64 };
+enum { EP_SETS_MAX = 64, EP_INPUTS_MAX = 256 };
 
 typedef enum ep_command {
   EP_COMMAND_EIGEN,
@@ -19,18 +19,23 @@ typedef enum ep_command {
   EP_COMMAND_COMPARE,
   EP_COMMAND_STRESS,
   EP_COMMAND_REPORT,
+  EP_COMMAND_CHECK,
   EP_COMMANDS
 } ep_command;
 
 typedef struct ep_cli {
   ep_command command;
-  const char *input; // mesh or scene
+  const char *input; // mesh or scene; of several the first
+  int ninputs;       // check takes several
+  const char *inputs[EP_INPUTS_MAX];
+  const char *repair; // check: where the repaired mesh goes
+  bool largest;       // check: of it keep the largest part only
   const char *out, *cache;
   int count; // eigen: eigenpairs wanted
   bool json, quiet;
   bool quick;         // stress: only the ends of every axis
   const char *replay; // stress: a failure's file
-  bool served; // run by the command, which reports in its place what both would say
+  bool served;        // run by the command, which reports in its place what both would say
   int nsets;
   const char *set[EP_SETS_MAX];
 } ep_cli;

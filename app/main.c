@@ -1,11 +1,14 @@
 // The command `eigenpose`. It links neither PETSc nor SLEPc: what needs them is done by the baker,
 // a program of its own in libexec.
+#include "app/check.h"
 #include "app/commands.h"
 #include "app/process.h"
 #include "app/run.h"
 
-static ep_status perform(const ep_cli *cli, char **argv, ep_error *err) {
+static ep_status perform(const ep_cli *cli, char **argv, bool *found, ep_error *err) {
   switch (cli->command) {
+  case EP_COMMAND_CHECK:
+    return ep_command_check(cli, found, err);
   case EP_COMMAND_PLAN:
     return ep_command_plan(cli, err);
   case EP_COMMAND_REPORT:
@@ -21,5 +24,7 @@ int main(int argc, char **argv) {
   ep_cli cli;
   ep_error err = {0};
   ep_cli_parse(argc, argv, &cli);
-  return perform(&cli, argv, &err) == EP_OK ? 0 : ep_cli_fail(&cli, &err);
+  bool found = false; // check: errors in what was checked
+  if (perform(&cli, argv, &found, &err) != EP_OK) return ep_cli_fail(&cli, &err);
+  return found ? EP_EXIT_FOUND : 0;
 }

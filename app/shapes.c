@@ -8,6 +8,21 @@
 #include "app/regions.h"
 #include "app/select.h"
 #include "mesh/io.h"
+#include "mesh/quality.h"
+
+// They are no error: everything is computed with them, but stiffly and with less accuracy.
+static void warn_of_slivers(const ep_mesh *mesh, ep_log *log) {
+  ep_mesh_quality quality;
+  char worst[300];
+  ep_mesh_measure(mesh, &quality);
+  if (!quality.slivers) return;
+  ep_mesh_worst_text(&quality, worst, sizeof worst);
+  ep_warn(
+      log,
+      "%s: %d tets are slivers (dihedral angles within %g degree of 0 or 180); worst: %s; let the "
+      "mesher optimise its quality",
+      mesh->name, quality.slivers, EP_SLIVER_DEGREES, worst);
+}
 
 static ep_status read_shape(const char *path, const char *family, bool whole, ep_log *log,
                             ep_shapes *out, int *number, ep_error *err) {
@@ -22,6 +37,7 @@ static ep_status read_shape(const char *path, const char *family, bool whole, ep
   else
     snprintf(shape->name, sizeof shape->name, "object");
   EP_TRY(ep_mesh_require_sound(&shape->mesh, &findings, whole, err));
+  warn_of_slivers(&shape->mesh, log);
   const ep_mesh *mesh = &shape->mesh;
   ep_hash_text text = {0};
   ep_hash_add_bytes(&text, "x", mesh->x, 3 * (size_t)mesh->nv * sizeof *mesh->x);

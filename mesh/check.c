@@ -33,7 +33,7 @@ static ep_status check_tets(ep_mesh *mesh, ep_mesh_findings *f, ep_error *err) {
     if (degenerate && f->degenerate_tets++ == 0) f->first_degenerate = e;
     if (!(volume[e] < 0)) continue;
     swap_int(v + 2, v + 3);
-    if (!degenerate) f->repaired_orientation++;
+    if (!degenerate && f->repaired_orientation++ == 0) f->first_inverted = e;
   }
   free(volume);
   return EP_OK;

@@ -43,6 +43,7 @@ enum { EP_UNREAD_MAX = 64 };
 // What reading and checking found; all counts, first offender by index in the file, from 0.
 typedef struct ep_mesh_findings {
   int repaired_orientation; // tets turned round
+  int first_inverted;       // of these, -1 where none; counts all tets of the file
   int dropped_cells;        // cells that are not linear tets
   int unused_vertices, duplicate_vertices, degenerate_tets, components;
   int first_duplicate, first_degenerate, first_unused; // -1 where none

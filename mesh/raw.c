@@ -168,6 +168,7 @@ ep_status ep_raw_finish(ep_raw_mesh *raw, ep_mesh *out, ep_mesh_findings *findin
                         .first_duplicate = -1,
                         .first_degenerate = -1,
                         .first_unused = -1,
+                        .first_inverted = -1,
                         .first_repeated = -1,
                         .unread_arrays = raw->unread};
   memcpy(f.first_unread_array, raw->first_unread, sizeof f.first_unread_array);

@@ -11,7 +11,9 @@ static const char folder[] = EP_SOURCE_DIR "/data/scenes";
 
 static void check_selection(const ep_selection *s) {
   must(s->key[0] != '\0', "a selection knows its key");
-  must((s->kind == EP_SELECT_FILE) == (s->path != NULL), "a file has a path");
+  must((s->kind == EP_SELECT_FILE || s->kind == EP_SELECT_FIELD) == (s->path != NULL),
+       "a file has a path, a field a name");
+  must(isfinite(s->value), "finite values");
   for (int k = 0; k < 3; k++) must(isfinite(s->a[k]) && isfinite(s->b[k]), "finite selections");
 }
 
