@@ -175,6 +175,14 @@ void place_bar_twisted(const double u[3], double x[3]) {
   twist_point(p, x);
 }
 
+void place_bar_curled(const double u[3], double x[3]) {
+  double p[3];
+  place_bar(u, p);
+  twist_point(p, x);
+  bend_point(x, p);
+  memcpy(x, p, sizeof p);
+}
+
 // Square to disc: (a, b) in [-1, 1]^2, keeping area elements bounded (elliptical grid mapping).
 void place_rod(const double u[3], double x[3]) {
   const double a = u[1] - 1, b = u[2] - 1;
@@ -227,6 +235,34 @@ void place_bird_raised(const double u[3], double x[3]) {
   place_flyer(&f, u, x);
 }
 
+// Points in front of `start` bend along x towards y by `angle`, reached `length` farther.
+static void bow(double start, double length, double angle, double x[3]) {
+  const double s = x[0] - start, a = angle * smooth(s / length), y = x[1];
+  if (s <= 0) return;
+  enum { STEPS = 200 };
+  double along = 0, up = 0;
+  for (int i = 0; i < STEPS; i++) {
+    const double t = angle * smooth((i + 0.5) / STEPS * s / length);
+    along += cos(t) * s / STEPS;
+    up += sin(t) * s / STEPS;
+  }
+  x[0] = start + along - sin(a) * y;
+  x[1] = up + cos(a) * y;
+}
+
+void place_bird_banked(const double u[3], double x[3]) {
+  flyer f = BIRD;
+  f.raise = (u[2] > 7 ? 1 : -1) * half_turn() * 50 / 180;
+  place_flyer(&f, u, x);
+}
+
+void place_bird_diving(const double u[3], double x[3]) {
+  flyer f = BIRD;
+  f.raise = half_turn() / 6;
+  place_flyer(&f, u, x);
+  bow(0.1, 0.6, -half_turn() / 4, x);
+}
+
 void place_fish(const double u[3], double x[3]) {
   const flyer f = {1.6, 0.3, 0.14, 0.6, 0.05, -0.03, -0.03, 0.5, 0.03, -0.06, 0.2, -0.14, 0};
   place_flyer(&f, u, x);
@@ -259,6 +295,21 @@ void place_beast_walking(const double u[3], double x[3]) {
   }
 }
 
+void place_beast_rearing(const double u[3], double x[3]) {
+  place_beast(u, x);
+  x[1] -= 0.4;
+  bow(0.45, 0.5, half_turn() / 3, x);
+}
+
+void place_beast_curled(const double u[3], double x[3]) {
+  place_beast(u, x);
+  double turned[3] = {x[0], x[2], -x[1]};
+  bow(0.25, 0.9, half_turn() * 100 / 180, turned);
+  x[0] = turned[0];
+  x[1] = -turned[2];
+  x[2] = turned[1];
+}
+
 void place_beast_stretched(const double u[3], double x[3]) {
   place_beast(u, x);
   x[0] *= 1.15;
@@ -282,7 +333,7 @@ void pair_of_bodies(const char *name, body which, int refine_from, placement pla
   shape_from_mesh(&out->from, &from, functions);
   shape_from_mesh(&out->to, &to, functions);
   out->u = u;
-  free(other);
+  out->u_to = other;
 }
 
 void pair_free(truth_pair *pair) {
@@ -290,6 +341,7 @@ void pair_free(truth_pair *pair) {
   shape_free(&pair->to);
   free(pair->truth);
   free(pair->u);
+  free(pair->u_to);
   memset(pair, 0, sizeof *pair);
 }
 
@@ -346,4 +398,28 @@ ep_landmark pair_landmark(const truth_pair *pair, const double x[3]) {
 
 ep_landmark pair_landmark_of(const truth_pair *pair, const double u[3]) {
   return pair_landmark_at(pair, pair->u, u);
+}
+
+static bool in_box(const box *b, const double u[3]) {
+  for (int d = 0; d < 3; d++)
+    if (u[d] < b->low[d] - 1e-9 || u[d] > b->high[d] + 1e-9) return false;
+  return true;
+}
+
+void pair_regions(const truth_pair *pair, body which, ep_regions *out) {
+  const boxes *b = &BODY[which];
+  const ep_mesh *mesh[2] = {&pair->from.mesh, &pair->to.mesh};
+  const double *u[2] = {pair->u, pair->u_to};
+  *out = (ep_regions){.count = b->count, .shapes = 2};
+  out->start = calloc(2 * (size_t)b->count + 1, sizeof *out->start);
+  out->vertex = malloc((size_t)b->count * (size_t)(mesh[0]->nv + mesh[1]->nv) * sizeof(int));
+  assert_true(out->start && out->vertex);
+  int used = 0;
+  for (int g = 0; g < b->count; g++)
+    for (int s = 0; s < 2; s++) {
+      out->start[2 * g + s] = used;
+      for (int v = 0; v < mesh[s]->nv; v++)
+        if (in_box(&b->box[g], u[s] + 3 * v)) out->vertex[used++] = v;
+    }
+  out->start[2 * b->count] = used;
 }

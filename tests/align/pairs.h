@@ -15,13 +15,18 @@ void body_mesh(body which, int refine, unsigned seed, placement place, ep_mesh *
 void place_bar(const double u[3], double x[3]);
 void place_bar_bent(const double u[3], double x[3]);    // by 90 degrees, an arc
 void place_bar_twisted(const double u[3], double x[3]); // by 90 degrees, end to end
+void place_bar_curled(const double u[3], double x[3]);  // both
 void place_rod(const double u[3], double x[3]);         // the bar as an elliptical cylinder
 void place_plane(const double u[3], double x[3]);
 void place_bird(const double u[3], double x[3]);
 void place_bird_raised(const double u[3], double x[3]);
+void place_bird_banked(const double u[3], double x[3]); // one wing up, one down, by 50 degrees
+void place_bird_diving(const double u[3], double x[3]); // body bent down, wings raised by 30
 void place_fish(const double u[3], double x[3]);
 void place_beast(const double u[3], double x[3]);
 void place_beast_walking(const double u[3], double x[3]);   // legs moved by 40 degrees, head turned
+void place_beast_rearing(const double u[3], double x[3]);   // fore part raised by 60 degrees
+void place_beast_curled(const double u[3], double x[3]);    // bent sideways by 100 degrees
 void place_beast_stretched(const double u[3], double x[3]); // another build
 
 // Deformations of points in space: the bar's bend and twist.
@@ -32,12 +37,15 @@ typedef struct truth_pair {
   const char *name;
   test_shape from, to;
   double *truth; // (from's vertices x 3): where each belongs in `to`
-  double *u;     // (from's vertices x 3): parameters
+  double *u;     // (from's vertices x 3): parameters; NULL where made from data/
+  double *u_to;  // (to's vertices x 3)
 } truth_pair;
 
 // truth = place_to(u of from's vertices).
 void pair_of_bodies(const char *name, body which, int refine_from, placement place_from,
                     int refine_to, placement place_to, int functions, truth_pair *out);
+// The body's boxes as regions of the pair's meshes (column 0: from, 1: to).
+void pair_regions(const truth_pair *pair, body which, ep_regions *out);
 void pair_free(truth_pair *pair);
 // x <- scale R x + shift for `to` and the truth; the LB space is turned along (scaled).
 void pair_move(truth_pair *pair, const double axis[3], double degrees, double scale, double shift);

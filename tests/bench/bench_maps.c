@@ -2,7 +2,7 @@
 // al. 2019). Errors: mean distance of the mapped points to the truth over the bounding box's
 // diagonal, in per cent; all three end with the same projection into tets. Not a test: it prints a
 // table. bench_maps [word]: only pairs whose name contains the word; "composed": maps through a
-// family's rest shape; "70K": time of a large pair.
+// family's rest shape; "8K", "70K": time and memory of large pairs.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -11,10 +11,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 
 #include <cmocka.h>
 
 #include "align/private.h"
+#include "data_pairs.h"
 #include "linalg/dense.h"
 #include "linalg/petsc.h"
 #include "tests/align/pairs.h"
@@ -104,7 +106,29 @@ static void match(const truth_pair *pair, int landmarks, const ep_landmark *mark
 
 static const char *const VERDICTS[3] = {"good", "doubtful", "bad"};
 
-static void run(truth_pair *pair, body which) {
+static void print_guided(const truth_pair *pair, const char *how, ep_map *map) {
+  printf("%-24s %5s %5s  %8s %8s %8.2f  %-8s %5.3f  %s\n", how, "", "", "", "",
+         100 * pair_error(pair, map->tet, map->weight), VERDICTS[map->quality.verdict],
+         map->quality.cycle, map->quality.reasons);
+  ep_map_free(map);
+}
+
+// Boxes of the body as regions of both meshes.
+static void match_regions(const truth_pair *pair, body which) {
+  ep_regions regions;
+  ep_map map;
+  ep_error err = {0};
+  ep_map_options o = ep_default_map_options();
+  pair_regions(pair, which, &regions);
+  o.m = M;
+  o.regions = &regions;
+  if (ep_map_match(&pair->from.shape, &pair->to.shape, &o, NULL, &map, &err) != EP_OK)
+    fail_msg("%s", err.text);
+  print_guided(pair, "  with regions", &map);
+  ep_regions_free(&regions);
+}
+
+static void run(truth_pair *pair) {
   const size_t n = (size_t)pair->from.mesh.nv;
   int *tet = malloc(n * sizeof *tet);
   double *weight = malloc(4 * n * sizeof *weight);
@@ -118,74 +142,131 @@ static void run(truth_pair *pair, body which) {
          pair->to.mesh.nv, 100 * e_near, 100 * e_zoom, 100 * pair_error(pair, map.tet, map.weight),
          VERDICTS[map.quality.verdict], map.quality.cycle, seconds);
   ep_map_free(&map);
-  {
-    ep_landmark mark[6];
-    for (int m = 0; m < 6; m++) mark[m] = pair_landmark_of(pair, BODY_MARKS[which][m]);
-    match(pair, 6, mark, &map);
-    printf("%-24s %5s %5s  %8s %8s %8.2f  %-8s %5.3f  %s\n", "  with six landmarks", "", "", "", "",
-           100 * pair_error(pair, map.tet, map.weight), VERDICTS[map.quality.verdict],
-           map.quality.cycle, map.quality.reasons);
-    ep_map_free(&map);
-  }
   free(tet);
   free(weight);
 }
 
-// Poses of one family, mapped through its rest shape and independently.
-static void compose(const char *name, body which, placement object, placement rest,
-                    placement pose) {
-  truth_pair a, b, direct;
-  ep_map first, second, composed, independent;
+// Six landmarks, regions, and two landmarks on the example in a random rotation.
+static void run_guided(truth_pair *pair, body which) {
+  ep_landmark mark[MARKS];
+  ep_map map;
+  for (int m = 0; m < MARKS; m++) mark[m] = pair_landmark_of(pair, BODY_MARKS[which][m]);
+  match(pair, MARKS, mark, &map);
+  print_guided(pair, "  with six landmarks", &map);
+  if (which != BODY_BAR) match_regions(pair, which);
+  pair_move(pair, (double[3]){0.3, -0.8, 0.52}, 137, 2.5, 1);
+  for (int m = 0; m < 2; m++) mark[m] = pair_landmark_of(pair, BODY_MARKS[which][m]);
+  match(pair, 2, mark, &map);
+  print_guided(pair, "  turned, two landmarks", &map);
+}
+
+// What poses are used for is their motion: pose minus rest as the object's vertices see it. Mean
+// distance to the true motion over the diagonal, and that of the points themselves, in per cent.
+typedef struct pose_error {
+  double points, motion;
+} pose_error;
+
+static pose_error error_of(const truth_pair *rest, const ep_map *to_rest, const truth_pair *pose,
+                           const ep_mesh *pose_mesh, const ep_map *to_pose) {
+  const int n = rest->from.mesh.nv;
+  double *there = malloc(3 * (size_t)n * sizeof *there),
+         *here = malloc(3 * (size_t)n * sizeof *here);
+  pose_error e = {0};
+  assert_true(there && here);
+  ep_map_pull(to_pose, pose_mesh, 3, pose_mesh->x, there);
+  ep_map_pull(to_rest, &rest->to.mesh, 3, rest->to.mesh.x, here);
+  for (int i = 0; i < n; i++) {
+    double p2 = 0, m2 = 0;
+    for (int c = 0; c < 3; c++) {
+      const double there_off = there[3 * i + c] - pose->truth[3 * i + c];
+      p2 += there_off * there_off;
+      m2 += pow(there_off - (here[3 * i + c] - rest->truth[3 * i + c]), 2);
+    }
+    e.points += sqrt(p2);
+    e.motion += sqrt(m2);
+  }
+  const double unit = 100 / (n * ep_mesh_diagonal(pose_mesh));
+  free(there);
+  free(here);
+  return (pose_error){unit * e.points, unit * e.motion};
+}
+
+enum { POSES = 3 };
+typedef struct family {
+  const char *name;
+  body which;
+  placement object, rest, pose[POSES];
+} family;
+
+static const family FAMILIES[] = {
+    {"plane <- bird",
+     BODY_FLYER,
+     place_plane,
+     place_bird,
+     {place_bird_raised, place_bird_banked, place_bird_diving}},
+    {"beast <- other beast",
+     BODY_BEAST,
+     place_beast_stretched,
+     place_beast,
+     {place_beast_walking, place_beast_rearing, place_beast_curled}},
+    {"rod <- bar",
+     BODY_BAR,
+     place_rod,
+     place_bar,
+     {place_bar_bent, place_bar_twisted, place_bar_curled}},
+};
+
+// One pose of a family, whose rest shape is mapped by `first` already.
+static void compose(const family *f, int which, int marks, const truth_pair *rest,
+                    const ep_map *first, pose_error sum[2]) {
+  truth_pair pose, direct;
+  ep_map second, composed, independent;
   ep_error err = {0};
-  pair_of_bodies(name, which, 2, object, 3, rest, FUNCTIONS, &a);
-  pair_of_bodies(name, which, 3, rest, 3, pose, FUNCTIONS, &b);
-  pair_of_bodies(name, which, 2, object, 3, pose, FUNCTIONS, &direct);
-  // The middle meshes must be one: both are `to` of a and `from` of b but for the jitter.
-  shape_free(&b.from);
-  b.from = a.to;
-  b.from.shape = (ep_shape){&b.from.mesh, &b.from.lb, &b.from.mass};
-  match(&a, 0, NULL, &first);
-  match(&direct, 0, NULL, &independent);
+  ep_landmark mark[MARKS];
   ep_map_options o = ep_default_map_options();
   o.m = M;
   o.same_family = true;
-  if (ep_map_match(&b.from.shape, &b.to.shape, &o, NULL, &second, &err) != EP_OK)
+  pair_of_bodies(f->name, f->which, 3, f->rest, 3, f->pose[which], FUNCTIONS, &pose);
+  pair_of_bodies(f->name, f->which, 2, f->object, 3, f->pose[which], FUNCTIONS, &direct);
+  for (int m = 0; m < marks; m++) mark[m] = pair_landmark_of(&direct, BODY_MARKS[f->which][m]);
+  match(&direct, marks, mark, &independent);
+  if (ep_map_match(&rest->to.shape, &pose.to.shape, &o, NULL, &second, &err) != EP_OK ||
+      ep_map_compose(first, &rest->to.mesh, &second, &pose.to.mesh, &composed, &err) != EP_OK)
     fail_msg("%s", err.text);
-  if (ep_map_compose(&first, &b.from.mesh, &second, &b.to.mesh, &composed, &err) != EP_OK)
-    fail_msg("%s", err.text);
-  // Where composed and independent points lie, against the truth in the pose: `direct`'s truth.
-  // The motion is what examples are used for: compare displacements too.
-  const int n = direct.from.mesh.nv;
-  double *pose_c = malloc(3 * (size_t)n * sizeof *pose_c), *rest_c = malloc(3 * (size_t)n * 8);
-  double *pose_i = malloc(3 * (size_t)n * sizeof *pose_i), sum_c = 0, sum_i = 0;
-  assert_true(pose_c && rest_c && pose_i);
-  ep_map_pull(&composed, &b.to.mesh, 3, b.to.mesh.x, pose_c);
-  ep_map_pull(&independent, &direct.to.mesh, 3, direct.to.mesh.x, pose_i);
-  ep_map_pull(&first, &b.from.mesh, 3, b.from.mesh.x, rest_c);
-  for (int i = 0; i < n; i++) {
-    double c2 = 0, i2 = 0;
-    for (int c = 0; c < 3; c++) {
-      const double truth = direct.truth[3 * i + c] - a.truth[3 * i + c];
-      c2 += pow(pose_c[3 * i + c] - rest_c[3 * i + c] - truth, 2);
-      i2 += pow(pose_i[3 * i + c] - rest_c[3 * i + c] - truth, 2);
-    }
-    sum_c += sqrt(c2);
-    sum_i += sqrt(i2);
+  const pose_error both[2] = {error_of(rest, first, &direct, &pose.to.mesh, &composed),
+                              error_of(rest, first, &direct, &direct.to.mesh, &independent)};
+  printf("  pose %d: points %.2f and %.2f, motion %.2f and %.2f; %s and %s\n", which + 1,
+         both[0].points, both[1].points, both[0].motion, both[1].motion,
+         VERDICTS[composed.quality.verdict], VERDICTS[independent.quality.verdict]);
+  for (int i = 0; i < 2; i++) {
+    sum[i].points += both[i].points / POSES;
+    sum[i].motion += both[i].motion / POSES;
   }
-  const double unit = 100 / (n * ep_mesh_diagonal(&direct.to.mesh));
-  printf("%-24s points: composed %.2f, independent %.2f; motion: composed %.2f, independent %.2f\n",
-         name, 100 * pair_error(&direct, composed.tet, composed.weight),
-         100 * pair_error(&direct, independent.tet, independent.weight), unit * sum_c,
-         unit * sum_i);
-  free(pose_c);
-  free(pose_i);
-  free(rest_c);
-  ep_map *all[4] = {&first, &second, &composed, &independent};
-  for (int i = 0; i < 4; i++) ep_map_free(all[i]);
-  memset(&a.to, 0, sizeof a.to); // b owns it now
-  pair_free(&a);
-  pair_free(&b);
+  ep_map_free(&second);
+  ep_map_free(&composed);
+  ep_map_free(&independent);
+  pair_free(&pose);
   pair_free(&direct);
+}
+
+// Three poses, mapped through the family's rest shape and independently.
+static void run_family(const family *f, int marks) {
+  truth_pair rest;
+  ep_map first;
+  ep_landmark mark[MARKS];
+  pose_error sum[2] = {{0}};
+  pair_of_bodies(f->name, f->which, 2, f->object, 3, f->rest, FUNCTIONS, &rest);
+  for (int m = 0; m < marks; m++) mark[m] = pair_landmark_of(&rest, BODY_MARKS[f->which][m]);
+  match(&rest, marks, mark, &first);
+  printf("%s, %d landmarks: object <- rest %.2f\n", f->name, marks,
+         100 * pair_error(&rest, first.tet, first.weight));
+  for (int i = 0; i < POSES; i++) compose(f, i, marks, &rest, &first, sum);
+  printf("  mean: points composed %.2f, independent %.2f (ratio %.2f); motion composed %.2f, "
+         "independent %.2f (ratio %.2f)\n",
+         sum[0].points, sum[1].points, sum[0].points / sum[1].points, sum[0].motion, sum[1].motion,
+         sum[0].motion / sum[1].motion);
+  ep_map_free(&first);
+  pair_free(&rest);
 }
 
 typedef struct recipe {
@@ -209,16 +290,23 @@ static const recipe RECIPES[] = {
     {"plane -> fish", BODY_FLYER, 2, 3, place_plane, place_fish},
 };
 
-// Seconds of a map between large meshes; their spaces are not counted.
-static void large(void) {
+// Seconds and memory of a map between large meshes; their spaces are not counted in the seconds.
+static void large(const char *name, int refine_from, int refine_to) {
   truth_pair pair;
   ep_map map;
-  pair_of_bodies("70K", BODY_BEAST, 9, place_beast, 10, place_beast_walking, 20, &pair);
+  struct rusage before, after;
+  pair_of_bodies(name, BODY_BEAST, refine_from, place_beast, refine_to, place_beast_walking,
+                 FUNCTIONS, &pair);
+  getrusage(RUSAGE_SELF, &before);
   const double start = ep_seconds();
   match(&pair, 0, NULL, &map);
-  printf("%d -> %d vertices at m = %d: %.1f s, error %.2f per cent, %s\n", pair.from.mesh.nv,
-         pair.to.mesh.nv, map.m, ep_seconds() - start, 100 * pair_error(&pair, map.tet, map.weight),
-         VERDICTS[map.quality.verdict]);
+  const double seconds = ep_seconds() - start;
+  getrusage(RUSAGE_SELF, &after);
+  printf("%d -> %d vertices at m = %d: %.1f s, error %.2f per cent, %s; peak memory %ld MB, %ld MB "
+         "before the map\n",
+         pair.from.mesh.nv, pair.to.mesh.nv, map.m, seconds,
+         100 * pair_error(&pair, map.tet, map.weight), VERDICTS[map.quality.verdict],
+         after.ru_maxrss / 1024, before.ru_maxrss / 1024);
   ep_map_free(&map);
   pair_free(&pair);
 }
@@ -230,8 +318,11 @@ int main(int argc, char **argv) {
     fprintf(stderr, "%s\n", err.text);
     return 1;
   }
-  if (strcmp(word, "70K") == 0) {
-    large();
+  if (strcmp(word, "70K") == 0 || strcmp(word, "8K") == 0) {
+    if (word[0] == '7')
+      large(word, 9, 9);
+    else
+      large(word, 4, 4);
     ep_petsc_stop();
     return 0;
   }
@@ -243,14 +334,19 @@ int main(int argc, char **argv) {
     if (!strstr(r->name, word)) continue;
     pair_of_bodies(r->name, r->which, r->refine_from, r->from, r->refine_to, r->to, FUNCTIONS,
                    &pair);
-    run(&pair, r->which);
+    run(&pair);
+    run_guided(&pair, r->which);
     pair_free(&pair);
   }
-  if (strstr("composed", word)) {
-    compose("bird family", BODY_FLYER, place_plane, place_bird, place_bird_raised);
-    compose("fish <- bird family", BODY_FLYER, place_fish, place_bird, place_bird_raised);
-    compose("beast family", BODY_BEAST, place_beast_stretched, place_beast, place_beast_walking);
+  for (int i = 0; i < DATA_RECIPE_COUNT; i++) {
+    truth_pair pair;
+    if (!strstr(DATA_RECIPES[i].name, word) || !pair_of_data(&DATA_RECIPES[i], FUNCTIONS, &pair))
+      continue;
+    run(&pair);
+    pair_free(&pair);
   }
+  for (size_t i = 0; i < sizeof FAMILIES / sizeof *FAMILIES && strstr("composed", word); i++)
+    for (int marks = 0; marks <= MARKS; marks += MARKS) run_family(&FAMILIES[i], marks);
   ep_petsc_stop();
   return 0;
 }
