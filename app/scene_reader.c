@@ -39,7 +39,7 @@ ep_status ep_read_whole(const ep_scene_reader *r, const char *key, const double 
 ep_status ep_read_vector(const ep_scene_reader *r, const char *key, const double *given,
                          double *out) {
   for (int i = 0; i < 3; i++) {
-    if (!isfinite(given[i]) || fabs(given[i]) > 1e12)
+    if (!isfinite(given[i]) || fabs(given[i]) > 1e30)
       return ep_read_refuse(r, key, "component %d is %g; use finite numbers", i, given[i]);
     out[i] = given[i];
   }
