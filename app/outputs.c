@@ -326,12 +326,9 @@ void ep_summary_text(FILE *out, const json_t *report) {
   text_weights(out, report);
   const json_t *contact = json_object_get(report, "contact");
   if (contact)
-    fprintf(
-        out,
-        "contact: up to %.0f vertices touch; deepest %.3g m, %.2f %% of the diagonal; stiffness "
-        "raised up to %.3g times\n",
-        number(contact, "touching"), number(contact, "penetration"),
-        100 * number(contact, "penetration_share"), number(contact, "stiffness_raised"));
+    fprintf(out, "contact: up to %.0f vertices touch; deepest %.3g m, %.2f %% of the diagonal\n",
+            number(contact, "touching"), number(contact, "penetration"),
+            100 * number(contact, "penetration_share"));
   fprintf(out, "inverted tets: at most %.0f after any step\n", number(report, "inverted_tets"));
 }
 

@@ -97,9 +97,8 @@ static void add_timing(json_t *report, const ep_record *record) {
 }
 
 static json_t *contact_of(const ep_model *model, const ep_record *record) {
-  return json_pack("{s:i, s:f, s:f, s:f, s:f}", "touching", record->most_touching, "penetration",
-                   record->deepest, "penetration_share", record->deepest / model->rest_scale,
-                   "stiffness_raised", record->most_raised, "energy_injected", record->injected);
+  return json_pack("{s:i, s:f, s:f}", "touching", record->most_touching, "penetration",
+                   record->deepest, "penetration_share", record->deepest / model->rest_scale);
 }
 
 // The run's JSON object; out names the folder of the results.

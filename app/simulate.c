@@ -96,8 +96,6 @@ static void add_up(ep_record *record, const ep_advance *done) {
   record->halvings += done->halvings;
   record->target_evaluations += (int)done->evaluations;
   record->deepest = fmax(record->deepest, done->deepest);
-  record->most_raised = fmax(record->most_raised, done->raised);
-  record->injected += done->injected;
   if (done->touching > record->most_touching) record->most_touching = done->touching;
 }
 

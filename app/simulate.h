@@ -27,7 +27,6 @@ typedef struct ep_record {
   int newton_iterations, target_evaluations; // over the run
   int most_touching;                         // vertices at the end of any step
   double deepest;                            // penetration at the end of any step [m]
-  double most_raised, injected;              // of ep_contact_report: the most, the sum
 } ep_record;
 
 // Simulate scene->steps steps. What was done before a failure stays in the record.

@@ -170,8 +170,6 @@ static void add_step(const ep_step_report *report, ep_status status, ep_advance 
   const ep_contact_report *contact = &report->contact;
   out->last = *report;
   out->deepest = fmax(out->deepest, contact->deepest);
-  out->raised = fmax(out->raised, contact->raised);
-  out->injected += contact->injected;
   if (contact->touching > out->touching) out->touching = contact->touching;
 }
 

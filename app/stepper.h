@@ -22,8 +22,6 @@ ep_step_def *ep_stepper_def(ep_stepper *stepper);
 typedef struct ep_advance {
   ep_step_report last; // of the last step done
   double deepest;      // of its contact: over all steps
-  double raised;       // the most
-  double injected;     // the sum
   int touching;        // the most
   int newton_iterations, line_search_steps, projections, halvings;
   long evaluations;      // of the interpolation

@@ -299,10 +299,7 @@ static void measure(ep_state *state, const ep_step_def *def, const ep_frame *fra
                     ep_contact_report *report) {
   pass p = make_pass(state, def, frame, q, 0);
   const ep_contact_memory *m = &state->contact.memory;
-  *report = (ep_contact_report){.stiffness = p.law.stiffness,
-                                .raised = m->trial_raise,
-                                .passes = m->passes,
-                                .injected = ep_contact_injected(m)};
+  *report = (ep_contact_report){.stiffness = p.law.stiffness, .passes = m->passes};
   p.visit = add_report;
   p.report = report;
   over_obstacles(&p, def);
@@ -323,21 +320,13 @@ static void add_change(pass *p, int vertex, const ep_contact_path *path) {
 int ep_contact_again(ep_state *state, const ep_step_def *def, const ep_frame *frame,
                      const double *q) {
   ep_contact *c = &state->contact;
-  ep_contact_report now;
   if (!ep_contact_acts(state, def)) return 0;
-  measure(state, def, frame, q, &now);
   pass p = make_pass(state, def, frame, q, 0);
   p.visit = add_change;
   over_obstacles(&p, def);
-  if (!ep_contact_retry(def, state->model->rest_scale, now.deepest, p.change, p.pressing,
-                        &c->memory))
-    return 0;
+  if (!ep_contact_retry(p.change, p.pressing, &c->memory)) return 0;
   keep(state, frame, q, state->contact_lag, &c->lag);
   return 1;
-}
-
-void ep_contact_commit(ep_state *state, const ep_contact_report *report) {
-  ep_contact_memory_commit(report, &state->contact.memory);
 }
 
 int ep_contact_tree_sound(const ep_model *model) {

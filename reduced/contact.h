@@ -5,7 +5,7 @@
 // [R U_i, I, -(x - c) x]. Nothing is stored per vertex.
 //
 // A step: ep_contact_begin; minimise with ep_contact_energy; while ep_contact_again, minimise once
-// more from there; ep_contact_measure, and ep_contact_commit where the step succeeds.
+// more from there; ep_contact_measure.
 #ifndef EP_REDUCED_CONTACT_H
 #define EP_REDUCED_CONTACT_H
 
@@ -28,8 +28,7 @@ double ep_contact_energy(ep_state *state, const ep_step_def *def, const ep_frame
                          const double *q, double *g, double *h, int n);
 
 // After a minimum was found at q, frame: 1 where it has to be found once more, because friction has
-// to go by the normal forces found (at most EP_FRICTION_PASSES), or because the object went too
-// deep and the stiffness was raised.
+// to go by the normal forces found (at most EP_FRICTION_PASSES times).
 int ep_contact_again(ep_state *state, const ep_step_def *def, const ep_frame *frame,
                      const double *q);
 
@@ -37,9 +36,6 @@ int ep_contact_again(ep_state *state, const ep_step_def *def, const ep_frame *fr
 // origin for a held object), friction and damping included.
 void ep_contact_measure(ep_state *state, const ep_step_def *def, const ep_frame *frame,
                         const double *q, ep_contact_report *report);
-
-// The step is done: the state keeps its stiffness as long as something touches.
-void ep_contact_commit(ep_state *state, const ep_contact_report *report);
 
 // Checks the tree of a model that was read: ranges ascending and inside. 1 where sound.
 int ep_contact_tree_sound(const ep_model *model);

@@ -3,14 +3,10 @@
 #include <math.h>
 
 // A hundred times as stiff as the object over its own diagonal, begun at 0.2 % of it: what rests on
-// a plane then sinks in by less than the thickness; impacts raise it
-// (tests/reduced/test_contact.c).
-static const double stiffness_ratio = 100, thickness_share = 0.002;
-static const double depth_share = 0.005;  // raise the stiffness when deeper than this
-static const double touching_share = 1.5; // where something touched before: later
-static const double creep_share = 1e-3;   // diagonals per second that count as sticking
-static const double largest_raise = 1e6;
-enum { RAISES = 8 };
+// a plane then sinks in by less than the thickness. It gets stiffer below 0.25 % (to four times of
+// which impacts may go).
+static const double stiffness_ratio = 100, thickness_share = 0.002, depth_share = 0.0025;
+static const double creep_share = 1e-3; // diagonals per second that count as sticking
 
 static int at_least_zero(double x) {
   return x >= 0 && isfinite(x);
@@ -29,13 +25,13 @@ int ep_contact_def_valid(const ep_step_def *def) {
 ep_contact_law ep_contact_choose(const ep_step_def *def, double unit, double diagonal, int hessian,
                                  ep_contact_memory *memory) {
   const ep_contact_def *c = &def->contact;
-  return (ep_contact_law){
-      .stiffness = c->stiffness > 0 ? c->stiffness : stiffness_ratio * unit * memory->trial_raise,
-      .thickness = c->thickness > 0 ? c->thickness : thickness_share * diagonal,
-      .damping = c->damping,
-      .creep = creep_share * diagonal,
-      .dt = def->dt,
-      .careful = hessian && memory->hessians++ % 2 == 1};
+  return (ep_contact_law){.stiffness = c->stiffness > 0 ? c->stiffness : stiffness_ratio * unit,
+                          .thickness = c->thickness > 0 ? c->thickness : thickness_share * diagonal,
+                          .depth = c->depth > 0 ? 0.25 * c->depth : depth_share * diagonal,
+                          .damping = c->damping,
+                          .creep = creep_share * diagonal,
+                          .dt = def->dt,
+                          .careful = hessian && memory->hessians++ % 2 == 1};
 }
 
 double ep_contact_share(const ep_step_def *def) {
@@ -43,30 +39,13 @@ double ep_contact_share(const ep_step_def *def) {
 }
 
 void ep_contact_memory_begin(ep_contact_memory *m) {
-  m->trial_raise = m->raise;
-  m->passes = m->raises = m->hessians = 0;
+  m->passes = m->hessians = 0;
 }
 
-static int raise_stiffness(const ep_step_def *def, double diagonal, double deepest,
-                           ep_contact_memory *m) {
-  const double depth = def->contact.depth > 0 ? def->contact.depth : depth_share * diagonal;
-  const double limit = depth * (m->touching > 0 ? touching_share : 1);
-  if (def->contact.stiffness > 0 || !(deepest > limit) || m->raises == RAISES ||
-      m->trial_raise >= largest_raise)
-    return 0;
-  m->raises++;
-  m->trial_raise = fmin(largest_raise, m->trial_raise * fmin(16, fmax(2, 1.5 * deepest / limit)));
+int ep_contact_retry(double change, double pressing, ep_contact_memory *m) {
+  if (change <= EP_FRICTION_TOLERANCE * pressing || m->passes == EP_FRICTION_PASSES) return 0;
+  m->passes++;
   return 1;
-}
-
-int ep_contact_retry(const ep_step_def *def, double diagonal, double deepest, double change,
-                     double pressing, ep_contact_memory *m) {
-  int again = raise_stiffness(def, diagonal, deepest, m);
-  if (change > EP_FRICTION_TOLERANCE * pressing && m->passes < EP_FRICTION_PASSES) {
-    m->passes++;
-    again = 1;
-  }
-  return again;
 }
 
 void ep_contact_report_add(const ep_contact_law *law, const ep_contact_action *action,
@@ -81,14 +60,4 @@ void ep_contact_report_add(const ep_contact_law *law, const ep_contact_action *a
     out->force[i] += f[i];
     out->torque[i] += arm[j] * f[k] - arm[k] * f[j];
   }
-}
-
-double ep_contact_injected(const ep_contact_memory *m) {
-  return m->touching > 0 ? m->stored * (m->trial_raise / m->raise - 1) : 0;
-}
-
-void ep_contact_memory_commit(const ep_contact_report *report, ep_contact_memory *m) {
-  m->touching = report->touching;
-  m->stored = report->energy;
-  m->raise = report->touching ? m->trial_raise : 1;
 }

@@ -1,5 +1,5 @@
-// What a step makes of the contact numbers it is given: stiffness, thickness, when the stiffness is
-// raised. Shared by the subspace and the full space.
+// What a step makes of the contact numbers it is given, and when it is solved again for friction.
+// Shared by the subspace and the full space.
 #ifndef EP_REDUCED_CONTACT_LAW_H
 #define EP_REDUCED_CONTACT_LAW_H
 
@@ -10,13 +10,10 @@ enum { EP_FRICTION_PASSES = 4 }; // a step is solved at most so often again for 
 // Friction is settled when the normal forces it goes by are right to this share of their sum.
 #define EP_FRICTION_TOLERANCE 0.02
 
-// What contact keeps from step to step, and of the step at hand.
+// What contact keeps of the step at hand.
 typedef struct ep_contact_memory {
-  double raise, trial_raise; // factor on the chosen stiffness: after the last step, in this one
-  double stored;             // energy of the penalty after the last step
-  int touching;              // vertices after the last step
-  int passes, raises;        // of this step
-  int hessians;              // evaluated in this step
+  int passes;   // solved again for friction
+  int hessians; // evaluated
 } ep_contact_memory;
 
 // 1 where the contact numbers of a step are finite and in range, its obstacles too.
@@ -35,21 +32,12 @@ double ep_contact_share(const ep_step_def *def);
 
 void ep_contact_memory_begin(ep_contact_memory *memory);
 
-// After a minimum: 1 where the step has to be solved again. deepest: penetration there; change,
-// pressing: of the normal forces friction goes by, and their sum. Deeper than it may go: a stiffer
-// contact. Where nothing touched at the step's start this brings no energy in (the penalty was zero
-// there); else it is done later, at half the depth more, and what it brings in is told.
-int ep_contact_retry(const ep_step_def *def, double diagonal, double deepest, double change,
-                     double pressing, ep_contact_memory *memory);
+// After a minimum: 1 where the step has to be solved again for friction. change, pressing: of the
+// normal forces friction goes by, and their sum.
+int ep_contact_retry(double change, double pressing, ep_contact_memory *memory);
 
 // One point's action into the report; arm (3): from where torques are taken to the point.
 void ep_contact_report_add(const ep_contact_law *law, const ep_contact_action *action,
                            const double arm[3], ep_contact_report *report);
-
-// Energy the raise of this step brought in.
-double ep_contact_injected(const ep_contact_memory *memory);
-
-// The step succeeded.
-void ep_contact_memory_commit(const ep_contact_report *report, ep_contact_memory *memory);
 
 #endif

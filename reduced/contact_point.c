@@ -10,18 +10,26 @@ static void rotate(const double R[9], const double a[3], double out[3]) {
   for (int i = 0; i < 3; i++) out[i] = dot3(R + 3 * i, a);
 }
 
-double ep_contact_penalty(double thickness, double p, double *slope, double *curvature) {
+// 1 + growth y^3 up to deepest, then constant.
+static const double growth = 20, deepest = 4;
+
+double ep_contact_penalty(const ep_contact_law *law, double p, double *slope, double *curvature) {
+  const double h = law->thickness, delta = law->depth;
   *slope = *curvature = 0;
   if (!(p > 0)) return 0;
-  const double h = thickness;
   if (p < h) {
     *curvature = p / h;
     *slope = p * p / (2 * h);
     return p * p * p / (6 * h);
   }
-  *curvature = 1;
-  *slope = p - 0.5 * h;
-  return h * h / 6 + (p - h) * (0.5 * h + 0.5 * (p - h));
+  const double all = (p - h) / delta, y = fmin(all, deepest), y3 = growth * y * y * y;
+  *curvature = 1 + y3;
+  *slope = 0.5 * h + delta * y * (1 + y3 / 4);
+  const double energy = h * h / 6 + delta * y * (0.5 * h + delta * y * (0.5 + y3 / 20));
+  if (all <= deepest) return energy;
+  const double rest = delta * (all - deepest), before = *slope;
+  *slope += *curvature * rest;
+  return energy + rest * (before + 0.5 * *curvature * rest);
 }
 
 // The half-space a fast point meets in this step, in the obstacle's coordinates; 0: none.
@@ -90,7 +98,7 @@ static int add_lagged(const ep_contact_law *law, const facing *face, const ep_co
   double n[3], slope, curvature, local[3], carried[3], s[3];
   const double p = law->thickness - distance_at(face, path->lag, n);
   if (!(p > 0)) return 0;
-  ep_contact_penalty(law->thickness, p, &slope, &curvature);
+  ep_contact_penalty(law, p, &slope, &curvature);
   ep_obstacle_to_local(&o->start, path->start, local);
   ep_obstacle_to_world(&o->end, local, carried);
   for (int i = 0; i < 3; i++) s[i] = path->now[i] - carried[i];
@@ -112,9 +120,8 @@ int ep_contact_point(const ep_contact_law *law, const ep_obstacle *obstacle,
   if (path->fast) face.half_space = entered(obstacle, path, face.normal, &face.offset);
   double n[3], slope, curvature;
   out->distance = distance_at(&face, path->now, n);
-  const double energy =
-      law->stiffness * area *
-      ep_contact_penalty(law->thickness, law->thickness - out->distance, &slope, &curvature);
+  const double energy = law->stiffness * area *
+                        ep_contact_penalty(law, law->thickness - out->distance, &slope, &curvature);
   out->pressing = law->stiffness * area * slope;
   int acts = out->distance < law->thickness;
   out->energy += energy;
@@ -132,10 +139,8 @@ void ep_contact_change(const ep_contact_law *law, const ep_obstacle *obstacle,
   double n[3], now, lag, unused;
   if (!path->lag) return;
   if (path->fast) face.half_space = entered(obstacle, path, face.normal, &face.offset);
-  ep_contact_penalty(law->thickness, law->thickness - distance_at(&face, path->now, n), &now,
-                     &unused);
-  ep_contact_penalty(law->thickness, law->thickness - distance_at(&face, path->lag, n), &lag,
-                     &unused);
+  ep_contact_penalty(law, law->thickness - distance_at(&face, path->now, n), &now, &unused);
+  ep_contact_penalty(law, law->thickness - distance_at(&face, path->lag, n), &lag, &unused);
   *change += law->stiffness * area * fabs(now - lag);
   *pressing += law->stiffness * area * now;
 }

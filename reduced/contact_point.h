@@ -11,6 +11,7 @@
 typedef struct ep_contact_law {
   double stiffness; // k: pressure per depth [Pa/m]
   double thickness; // h: contact begins at this distance [length]
+  double depth;     // delta: penetration at which it gets stiffer [length]
   double damping;   // c [s]: normal pressure c k phi'' times the speed
   double creep;     // speed up to which friction is viscous [length/s]
   double dt;        // of the step [s]
@@ -37,9 +38,12 @@ typedef struct ep_contact_action {
   double pressing;      // normal force at x [N]
 } ep_contact_action;
 
-// phi(p), p = h - distance: p^3 / 6h up to p = h, then a parabola: twice continuously
-// differentiable, phi'' <= 1. Returns phi; slope and curvature too.
-double ep_contact_penalty(double thickness, double p, double *slope, double *curvature);
+// phi(p), p = h - distance, y = (p - h) / delta the penetration: phi'' = p / h up to p = h, then 1
+// + 20 y^3, constant from y = 4 on: twice continuously differentiable, convex. Soft where things
+// rest, stiffer the deeper they go: to y = 4 it takes 300 times the pressure of a penalty with
+// phi'' = 1, so that impacts end before, without a stiffness that changes over time and would bring
+// energy in. Returns phi; slope and curvature too.
+double ep_contact_penalty(const ep_contact_law *law, double p, double *slope, double *curvature);
 
 // A point with surface area `area`. With d the distance, p = h - d:
 //   normal   k A phi(p): Hessian k A phi''(p) n n^T (the obstacle's own curvature would make it

@@ -179,12 +179,12 @@ const double *ep_state_green_weights(const ep_state *state);
 // ---- step ------------------------------------------------------------------------------------
 typedef enum ep_example_force { EP_EXAMPLE_ENERGY, EP_EXAMPLE_LINEAR } ep_example_force;
 
-// How obstacles resist (reduced/contact_point.h); 0: chosen. The penalty's stiffness is chosen from
-// the object's own, and raised in a step that would otherwise end deeper than `depth`.
+// How obstacles resist (reduced/contact_point.h); 0: chosen. What rests sinks in by a part of the
+// thickness; the deeper, the stiffer, so that impacts end above `depth`.
 typedef struct ep_contact_def {
-  double stiffness; // pressure per depth [Pa/m]; given: never raised
+  double stiffness; // pressure per depth [Pa/m]; 0: 100 times Young's modulus over the diagonal
   double thickness; // contact begins at this distance [length]; 0: 0.2 % of the diagonal
-  double depth;     // wanted bound of the penetration [length]; 0: 0.5 % of the diagonal
+  double depth;     // bound of the penetration in impacts [length]; 0: 1 % of the diagonal
   double damping;   // of the normal motion [s]: pressure damping x stiffness x speed
 } ep_contact_def;
 
@@ -247,8 +247,6 @@ typedef struct ep_contact_report {
   double pressing;  // sum of the normal forces' sizes [N]
   double energy;    // stored in the penalty [J]
   double stiffness; // in use [Pa/m]
-  double raised;    // by this factor over the first choice
-  double injected;  // energy a late raise of the stiffness brought in [J]
   int passes;       // times the step was solved again for friction
 } ep_contact_report;
 

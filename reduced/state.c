@@ -73,7 +73,6 @@ ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_st
   state->green_kernel = ep_green_select();
   for (int g = 0; g < ep_model_regions(model); g++) state->w[g] = 1;
   ep_state_rest_frame(state);
-  state->contact.memory.raise = 1;
   state->energy_noise = 1e-13;
   const int narrow = model->evaluator == EP_EVALUATE_CUBIC_FLOAT;
   if (narrow) state->energy_noise = 2e-6, state->force_noise = 1e-5;

@@ -263,7 +263,6 @@ static void finish(ep_step_run *s, ep_contact_report *contact) {
     contact_gradient(s);
   if (s->contact && (!s->free || s->joint))
     ep_contact_measure(state, s->def, frame, state->x, contact);
-  if (s->contact) ep_contact_commit(state, contact);
   if (s->free)
     ep_free_finish(&s->motion, state->x, s->joint ? &s->iterate : NULL);
   else

@@ -23,7 +23,6 @@ ep_status ep_full_contact_create(const ep_fem *fem, ep_full_contact **out, ep_er
   c->mesh = fem->mesh;
   c->diagonal = ep_mesh_diagonal(fem->mesh);
   c->unit = mean_young(fem) / c->diagonal;
-  c->memory.raise = c->memory.trial_raise = 1;
   c->vertex = malloc(n * sizeof *c->vertex);
   c->area = malloc(n * sizeof *c->area);
   c->start = calloc(9 * n, sizeof *c->start);
@@ -111,10 +110,7 @@ void ep_full_contact_measure(ep_full_contact *c, const ep_step_def *def, const d
                              ep_contact_report *report) {
   const ep_contact_law law = law_of(c, def, false);
   positions at;
-  *report = (ep_contact_report){.stiffness = law.stiffness,
-                                .raised = c->memory.trial_raise,
-                                .passes = c->memory.passes,
-                                .injected = ep_contact_injected(&c->memory)};
+  *report = (ep_contact_report){.stiffness = law.stiffness, .passes = c->memory.passes};
   for (int o = 0; o < def->obstacles; o++)
     for (int i = 0; i < c->count; i++) {
       ep_contact_action act = {0};
@@ -126,17 +122,15 @@ void ep_full_contact_measure(ep_full_contact *c, const ep_step_def *def, const d
 
 int ep_full_contact_again(ep_full_contact *c, const ep_step_def *def, const double *u) {
   const ep_contact_law law = law_of(c, def, false);
-  ep_contact_report now;
   positions at;
   double change = 0, pressing = 0;
-  ep_full_contact_measure(c, def, u, &now);
   for (int o = 0; o < def->obstacles; o++)
     for (int i = 0; i < c->count; i++) {
       ep_contact_path path = path_of(c, &def->obstacle[o], c->vertex[i], u, &at);
       if (def->obstacle[o].friction == 0 && law.damping == 0) path.lag = NULL;
       ep_contact_change(&law, &def->obstacle[o], &path, c->area[i], &change, &pressing);
     }
-  if (!ep_contact_retry(def, c->diagonal, now.deepest, change, pressing, &c->memory)) return 0;
+  if (!ep_contact_retry(change, pressing, &c->memory)) return 0;
   memcpy(c->lag, u, 3 * (size_t)c->mesh->nv * sizeof *u);
   return 1;
 }

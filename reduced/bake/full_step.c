@@ -290,7 +290,6 @@ static ep_status finish_contact(ep_full_move *m, ep_error *err) {
   ep_full_contact *contact = m->full->contact;
   if (!ep_full_touches(m)) return EP_OK;
   ep_full_contact_measure(contact, m->def, m->full->x, &m->report->contact);
-  ep_contact_memory_commit(&m->report->contact, &contact->memory);
   return m->def->integrator == EP_NEWMARK ? take_contact_off(m, err) : EP_OK;
 }
 
