@@ -58,7 +58,10 @@ static void add_reduced(ep_comparison *c, const ep_sweep *s, ep_point point) {
     point.method = EP_METHOD_CUBATURE;
     for (int j = 0; j < s->nelements && wants(s, EP_METHOD_CUBATURE); j++) {
       point.s = s->elements[j];
-      if (point.s < c->tets) add(c, point);
+      for (int k = 0; k < s->nprecisions && point.s < c->tets; k++) {
+        point.precision = (ep_precision)s->precision[k];
+        add(c, point);
+      }
     }
     point.method = EP_METHOD_CUBIC;
     point.s =

@@ -72,7 +72,7 @@ static const char STYLE[] =
     ".scroll{overflow-x:auto}table{border-collapse:collapse;font-size:13px;"
     "font-variant-numeric:tabular-nums}th,td{padding:.22rem .34rem;border-bottom:1px solid #dde2e7;"
     "text-align:right;white-space:nowrap}th:first-child{text-align:left;font-weight:500}"
-    "thead th{border-bottom:2px solid #8a93a0;font-weight:600}tr.best{background:#e8f4ec}"
+    "thead th{white-space:normal;vertical-align:bottom;border-bottom:2px solid #8a93a0;font-weight:600}tr.best{background:#e8f4ec}"
     "td.failed{color:#a11;text-align:left;white-space:normal}.note{color:#566070}"
     ".pick{background:#e8f4ec;border-left:4px solid #218c54;padding:.6rem .9rem}";
 

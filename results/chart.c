@@ -197,10 +197,15 @@ static int mark_of(const ep_chart_series *s) {
   return (s->color + s->color / COLORS) % COLORS;
 }
 
+// Lines without marks are broken where their colour comes a second time.
+static bool gap(const ep_chart_series *s, int i) {
+  return !s->marks && s->color / COLORS % 2 && i % 4 == 3;
+}
+
 static void draw_series(canvas *c, const ep_chart_series *s, const axis *x, const axis *y) {
   const int color = FIRST_SERIES + s->color % COLORS;
   for (int i = 0; i + 1 < s->n && s->line; i++)
-    if (drawable(x, y, s, i) && drawable(x, y, s, i + 1))
+    if (!gap(s, i) && drawable(x, y, s, i) && drawable(x, y, s, i + 1))
       put_line(c, pixel(x, s->x[i]), pixel(y, s->y[i]), pixel(x, s->x[i + 1]),
                pixel(y, s->y[i + 1]), s->marks ? 1 : 2, color);
   for (int i = 0; i < s->n; i++) {
@@ -286,7 +291,12 @@ static void draw_legend(canvas *c, const ep_chart *chart, double left) {
     const ep_chart_series *series = &chart->list[s];
     const double y = TOP + 10 + LEGEND * s;
     const int color = FIRST_SERIES + series->color % COLORS;
-    if (series->line) put_line(c, left, y, left + 22, y, series->marks ? 1 : 2, color);
+    if (series->line && gap(series, 3)) {
+      put_line(c, left, y, left + 9, y, 2, color);
+      put_line(c, left + 13, y, left + 22, y, 2, color);
+    } else if (series->line) {
+      put_line(c, left, y, left + 22, y, series->marks ? 1 : 2, color);
+    }
     if (series->marks) put_mark(c, left + 11, y, mark_of(series), color);
     put_text(c, left + 30, y + 4, TEXT, 0, INK, series->name);
   }

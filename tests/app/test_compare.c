@@ -175,17 +175,23 @@ static double number(const json_t *point, const char *key) {
   return json_number_value(value);
 }
 
-static const json_t *point_of(const json_t *root, const char *method, int r, const char *solver) {
+static const json_t *point_with(const json_t *root, const char *method, int r, const char *solver,
+                                const char *precision) {
   size_t i;
   json_t *p;
   json_array_foreach(json_object_get(root, "points"), i, p) {
     if (strcmp(json_string_value(json_object_get(p, "method")), method) == 0 &&
         (int)number(p, "r") == r &&
-        strcmp(json_string_value(json_object_get(p, "solver")), solver) == 0)
+        strcmp(json_string_value(json_object_get(p, "solver")), solver) == 0 &&
+        strcmp(json_string_value(json_object_get(p, "precision")), precision) == 0)
       return p;
   }
   fail_msg("no point %s r = %d %s", method, r, solver);
   return NULL;
+}
+
+static const json_t *point_of(const json_t *root, const char *method, int r, const char *solver) {
+  return point_with(root, method, r, solver, "double");
 }
 
 static int lines_of(const char *text) {
@@ -204,6 +210,10 @@ static void check_sweep(const json_t *root) {
   assert_true(number(many, "force_error") < 1e-12); // the same sums in another order
   const json_t *trained = point_of(root, "cubature", 12, "newton");
   assert_true(number(trained, "force_error") > 1e-6 && number(trained, "force_error") < 0.5);
+  // floats store the gradients to 6e-8 of their size
+  const json_t *floats = point_with(root, "cubature", 12, "newton", "float");
+  assert_true(fabs(number(floats, "force_error") - number(trained, "force_error")) < 1e-5);
+  assert_true(fabs(number(floats, "position_error") - number(trained, "position_error")) < 1e-5);
   // both solvers meet at the same minimum (relative gradient 1e-6)
   const json_t *slsqp = point_of(root, "all", 12, "LD_SLSQP");
   assert_true(fabs(number(slsqp, "position_error") - number(many, "position_error")) < 1e-5);
@@ -233,7 +243,7 @@ static void the_program_compares(void **state) {
   if (command(call) != 0) fail_msg("%s", text_of("err.txt"));
   json_t *first = report();
   const int points = (int)json_array_size(json_object_get(first, "points"));
-  assert_int_equal(points, 2 * 2 * 4 + 1); // r, solvers; cubature, cubic twice, all; full
+  assert_int_equal(points, 2 * 2 * 5 + 1); // r, solvers; cubature and cubic twice, all; full
   assert_int_equal(cached_points(first), 0);
   check_sweep(first);
   char *csv = text_of("page/results.csv"), *page = text_of("page/index.html");
