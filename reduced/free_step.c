@@ -179,6 +179,8 @@ void ep_free_begin(ep_free_step *f, ep_state *state, const ep_step_def *def) {
                             .dt_before = state->dt_before};
   ep_integrator_predict(def->integrator, r, def->dt, &motion, state->free_base, state->free_ahead,
                         &f->rate, &f->inertia);
+  f->turn_inertia = f->inertia;
+  if (def->integrator == EP_BDF2 && state->dt_before > 0) f->turn_inertia = 2 * f->rate / def->dt;
   for (int i = 0; i < 3; i++) {
     velocity[i] = state->linear[i] / f->mass;
     acceleration[i] = state->linear_rate[i] / f->mass;

@@ -27,8 +27,12 @@
 typedef struct ep_free_step {
   ep_state *state;
   const ep_step_def *def;
-  double rate, inertia;         // of the integrator
-  double mass;                  //
+  double rate, inertia; // of the integrator
+  // inertia of the rotation: a torque outside at the end turns the step by J^-1 torque /
+  // turn_inertia: half its impulse where psi follows the mean momentum (Newmark, BDF2), all of it
+  // for implicit Euler
+  double turn_inertia;
+  double mass;
   double c_base[3], c_ahead[3]; // as integrator.h, of the centre of mass
   double linear_ahead[3];       // momenta at the end if nothing acts
   double angular_ahead[3];      //

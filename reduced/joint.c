@@ -57,13 +57,13 @@ double ep_joint_rigid(const ep_step_run *s, const double *x, double *g, double *
     for (int a = 0; a < r; a++) hd[i] += state->free_h[i * r + a] * (x[a] - state->free_at[a]);
   }
   ep_rotate(f->j, z, jz);
-  sum += s->inertia * (ep_dot(3, body, hd) + 0.5 * ep_dot(3, z, jz));
+  sum += s->inertia * ep_dot(3, body, hd) + 0.5 * f->turn_inertia * ep_dot(3, z, jz);
   if (g) {
     for (int a = 0; a < r; a++)
       for (int i = 0; i < 3; i++) g[a] += s->inertia * body[i] * state->free_h[i * r + a];
-    for (int i = 0; i < 3; i++) hd[i] += jz[i];
+    for (int i = 0; i < 3; i++) hd[i] = s->inertia * hd[i] + f->turn_inertia * jz[i];
     ep_rotate(s->iterate.R, hd, world);
-    for (int i = 0; i < 3; i++) g[r + 3 + i] += s->inertia * world[i] / s->unit[1];
+    for (int i = 0; i < 3; i++) g[r + 3 + i] += world[i] / s->unit[1];
   }
   if (!h) return sum;
   for (int i = 0; i < 3; i++) h[(r + i) * (n + 1)] += s->inertia + drag;
@@ -73,7 +73,7 @@ double ep_joint_rigid(const ep_step_run *s, const double *x, double *g, double *
     ep_rotate(f->j, column, jz);
     ep_rotate(s->iterate.R, jz, world);
     for (int i = 0; i < 3; i++)
-      h[(r + 3 + i) * n + r + 3 + c] += s->inertia * world[i] / (s->unit[1] * s->unit[1]);
+      h[(r + 3 + i) * n + r + 3 + c] += f->turn_inertia * world[i] / (s->unit[1] * s->unit[1]);
     for (int a = 0; a < r; a++) {
       double coupling = 0;
       for (int i = 0; i < 3; i++) coupling += column[i] * state->free_h[i * r + a];
