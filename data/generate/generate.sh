@@ -112,7 +112,7 @@ mesh_car() {
 poses_car() {
   pose estate.veg estate-arc.veg $car_arc
   pose estate.veg estate-twist.veg $car_twist
-  pose car.msh car-arc.veg $car_arc
+  pose car.msh car-arc.veg arc 0,0,0 1,0,0 0,-1,0 0.6 32 arc 0,0,0 -1,0,0 0,-1,0 0.6 32
   pose car.msh car-s.veg $car_s
   pose car.msh car-twist.veg $car_twist
 }
