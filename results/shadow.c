@@ -115,6 +115,15 @@ void ep_shadow_free(ep_shadow *shadow) {
   memset(shadow, 0, sizeof *shadow);
 }
 
+// Shadows reach beyond the frame: they fade out before its edges instead of being cut off.
+static double fade(const ep_frame *frame, double x, double y) {
+  static const double band = 0.16; // share of the shorter side
+  const double side = fmin(frame->width, frame->height) * band;
+  const double inside = fmin(fmin(x, frame->width - x), fmin(y, frame->height - y));
+  const double t = fmin(fmax(inside / side, 0), 1);
+  return t * t * (3 - 2 * t);
+}
+
 double ep_shadow_at(const ep_shadow *s, const ep_camera *camera, const ep_frame *frame, double x,
                     double y) {
   if (s->size == 0) return 0;
@@ -142,5 +151,5 @@ double ep_shadow_at(const ep_shadow *s, const ep_camera *camera, const ep_frame 
   const float *d = s->dark + (size_t)j * (size_t)s->size + i;
   const double low = (double)d[0] * (1 - fx) + (double)d[1] * fx;
   const double high = (double)d[s->size] * (1 - fx) + (double)d[s->size + 1] * fx;
-  return darkness * (low * (1 - fy) + high * fy);
+  return fade(frame, x, y) * darkness * (low * (1 - fy) + high * fy);
 }
