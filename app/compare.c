@@ -385,6 +385,13 @@ ep_status ep_command_compare(const ep_cli *cli, ep_error *err) {
                    "compare does not know examples of a region on the LB path yet; leave "
                    "families[].region out, or use --set examples.path=green");
   }
+  if (session.scene.nobstacles || session.scene.ndrags) {
+    ep_session_close(&session);
+    return ep_fail(err, EP_ERR_UNSUPPORTED,
+                   "%s: compare knows neither obstacles nor drags in this version; take them out "
+                   "(--set obstacles=[])",
+                   cli->input);
+  }
   if (session.shapes.nfixed == 0) {
     ep_session_close(&session);
     return ep_fail(err, EP_ERR_UNSUPPORTED,

@@ -127,15 +127,21 @@ static ep_status read_push(const ep_scene_reader *r, const char *key, const raw_
 static ep_status read_loads(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out) {
   if (!raw->loads_count) return EP_OK;
   out->load = calloc(raw->loads_count, sizeof *out->load);
-  if (!out->load) return ep_read_no_memory(r);
+  out->drag = calloc(raw->loads_count, sizeof *out->drag);
+  if (!out->load || !out->drag) return ep_read_no_memory(r);
   for (unsigned i = 0; i < raw->loads_count; i++) {
     const raw_load *given = &raw->loads[i];
-    ep_load *load = &out->load[i];
+    ep_load *load = &out->load[out->nloads];
     char key[64];
     snprintf(key, sizeof key, "loads.%u", i);
+    if ((given->gravity != NULL) + (given->push != NULL) + (given->drag != NULL) != 1)
+      return ep_read_refuse(r, key, "give one of gravity, push, drag");
+    if (given->drag) {
+      snprintf(key, sizeof key, "loads.%u.drag", i);
+      EP_TRY(ep_read_drag(r, key, given->drag, &out->drag[out->ndrags++]));
+      continue;
+    }
     out->nloads++;
-    if ((given->gravity != NULL) == (given->push != NULL))
-      return ep_read_refuse(r, key, "give one of gravity, push");
     load->gravity = given->gravity != NULL;
     if (load->gravity) {
       EP_TRY(ep_read_vector(r, key, given->gravity, load->vector));
@@ -284,6 +290,11 @@ void ep_scene_free(ep_scene *scene) {
     free(scene->region[i].where.path);
   }
   free(scene->region);
+  for (int i = 0; i < scene->ndrags; i++) {
+    free(scene->drag[i].where.path);
+    free(scene->drag[i].path.key);
+  }
+  free(scene->drag);
   for (int i = 0; i < scene->nobstacles; i++) free(scene->obstacle[i].motion.key);
   free(scene->obstacle);
   free(scene->fixed);

@@ -89,6 +89,14 @@ typedef struct ep_load {
   double from, until, ramp; // [s]
 } ep_load;
 
+// A damped spring that drags the centre of some vertices along a path.
+typedef struct ep_scene_drag {
+  ep_selection where;
+  ep_motion_path path;       // `move` of its keyframes: where to, in the world
+  double stiffness, damping; // [N/m], [N s/m]
+  double from, until;        // [s]
+} ep_scene_drag;
+
 // A plane, sphere or box in the way, moving or not.
 typedef struct ep_scene_obstacle {
   ep_obstacle_kind kind;
@@ -160,12 +168,14 @@ typedef struct ep_scene {
   ep_start start;     // all zero for a held object
   int nloads;
   ep_load *load;
+  int ndrags;
+  ep_scene_drag *drag;
   int nobstacles;
   ep_scene_obstacle *obstacle;
   ep_contact_def contact;
   int every;
   unsigned formats;
-  int nmoments; // of the strip; 0: equally spaced ones
+  int nmoments;                  // of the strip; 0: equally spaced ones
   double moment[EP_MOMENTS_MAX]; // [s]
   ep_sweep sweep;
 } ep_scene;

@@ -220,9 +220,29 @@ static const cyaml_schema_field_t push_fields[] = {
     NUMBER(raw_push, ramp),
     CYAML_FIELD_END,
 };
+static const cyaml_schema_field_t waypoint_fields[] = {
+    CYAML_FIELD_FLOAT("time", CYAML_FLAG_DEFAULT, raw_waypoint, time),
+    VECTOR(raw_waypoint, at),
+    CYAML_FIELD_END,
+};
+static const cyaml_schema_value_t waypoint = {
+    CYAML_VALUE_MAPPING(CYAML_FLAG_DEFAULT, raw_waypoint, waypoint_fields)};
+static const cyaml_schema_field_t drag_fields[] = {
+    PART(raw_drag, box, box_fields),
+    PART(raw_drag, plane, plane_fields),
+    TEXT(raw_drag, file),
+    CYAML_FIELD_SEQUENCE("path", CYAML_FLAG_POINTER, raw_drag, path, &waypoint, 1, 100000),
+    CYAML_FIELD_FLOAT("stiffness", CYAML_FLAG_DEFAULT, raw_drag, stiffness),
+    NUMBER(raw_drag, damping),
+    NUMBER(raw_drag, from),
+    NUMBER(raw_drag, until),
+    CYAML_FIELD_BOOL_PTR("smooth", OPTIONAL, raw_drag, smooth),
+    CYAML_FIELD_END,
+};
 static const cyaml_schema_field_t load_fields[] = {
     CYAML_FIELD_SEQUENCE("gravity", OPTIONAL, raw_load, gravity, &number, 3, 3),
     PART(raw_load, push, push_fields),
+    PART(raw_load, drag, drag_fields),
     CYAML_FIELD_END,
 };
 static const cyaml_schema_value_t load = {

@@ -94,10 +94,23 @@ typedef struct raw_push {
   double force[3];
   double *from, *until, *ramp;
 } raw_push;
+typedef struct raw_waypoint {
+  double time, at[3];
+} raw_waypoint;
+typedef struct raw_drag {
+  raw_box *box;
+  raw_plane *plane;
+  char *file;
+  raw_waypoint *path;
+  unsigned path_count;
+  double stiffness, *damping, *from, *until;
+  bool *smooth;
+} raw_drag;
 typedef struct raw_load {
   double *gravity; // 3
   unsigned gravity_count;
   raw_push *push;
+  raw_drag *drag;
 } raw_load;
 typedef struct raw_turn {
   double axis[3], degrees;

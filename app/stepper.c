@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "app/drags.h"
 #include "app/free_object.h"
 #include "app/obstacles.h"
 #include "reduced/bake/nlopt_target.h"
@@ -28,6 +29,7 @@ struct ep_stepper {
   double *region_strength; // (regions) of a model with regions; NULL
   double *force;           // (r) of the step at hand
   ep_free_loads free;      // loads of a free object, instead of `load` and `force`
+  ep_springs drags;        // of the step at hand
   ep_obstacle *obstacle;   // (nobstacles) where they are in the step at hand
 };
 
@@ -124,6 +126,11 @@ static ep_status set_up(ep_stepper *s, const ep_shapes *shapes, ep_error *err) {
     EP_TRY(ep_nlopt_target_create(s->state, s->scene->algorithm, 0, &s->nlopt, err));
   EP_TRY(read_strengths(s, shapes, err));
   set_up_step(s);
+  EP_TRY(ep_drags_make(s->scene, shapes, s->model, &s->drags, err));
+  if (s->drags.count) {
+    s->def.outer = ep_springs_energy;
+    s->def.outer_user = &s->drags;
+  }
   return make_obstacles(s, err);
 }
 
@@ -144,6 +151,7 @@ void ep_stepper_close(ep_stepper *s) {
   if (!s) return;
   ep_nlopt_target_free(s->nlopt);
   ep_free_loads_free(&s->free);
+  ep_drags_free(&s->drags);
   free(s->load);
   free(s->force);
   free(s->region_strength);
@@ -179,6 +187,7 @@ static ep_status advance(ep_stepper *s, double t, double dt, bool loads, int lev
   s->def.dt = dt;
   set_force(s, t + dt, loads);
   ep_obstacles_move(s->scene, t, t + dt, s->obstacle);
+  ep_drags_set(s->scene, s->state, t, dt, loads, &s->drags);
   const ep_status status = ep_step(s->state, &s->def, &report);
   add_step(&report, status, out);
   if (status != EP_ERR_NUMERIC || level == EP_HALVINGS_MAX) return status;
