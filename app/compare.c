@@ -376,26 +376,31 @@ static ep_status output(sweep *w, ep_error *err) {
   return EP_OK;
 }
 
-ep_status ep_command_compare(const ep_cli *cli, ep_error *err) {
-  ep_session session;
-  EP_TRY(ep_session_open(cli, &session, err));
-  if (session.shapes.sets) {
-    ep_session_close(&session);
+// What a run may have and a comparison does not measure: named, never left out in silence.
+static ep_status check_known(const ep_session *session, ep_error *err) {
+  const ep_scene *scene = &session->scene;
+  if (session->shapes.sets > 0)
     return ep_fail(err, EP_ERR_UNSUPPORTED,
                    "compare does not know examples of a region on the LB path yet; leave "
                    "families[].region out, or use --set examples.path=green");
-  }
-  if (session.scene.nobstacles || session.scene.ndrags) {
-    ep_session_close(&session);
+  if (session->shapes.nfixed == 0)
+    return ep_fail(err, EP_ERR_UNSUPPORTED,
+                   "compare does not follow free objects yet; compare the object held by `fixed`");
+  if (scene->nobstacles > 0 || scene->ndrags > 0)
     return ep_fail(err, EP_ERR_UNSUPPORTED,
                    "%s: compare knows neither obstacles nor drags in this version; take them out "
                    "(--set obstacles=[])",
-                   cli->input);
-  }
-  if (session.shapes.nfixed == 0) {
+                   scene->path);
+  return EP_OK;
+}
+
+ep_status ep_command_compare(const ep_cli *cli, ep_error *err) {
+  ep_session session;
+  EP_TRY(ep_session_open(cli, &session, err));
+  ep_status status = check_known(&session, err);
+  if (status != EP_OK) {
     ep_session_close(&session);
-    return ep_fail(err, EP_ERR_UNSUPPORTED,
-                   "compare does not follow free objects yet; compare the object held by `fixed`");
+    return status;
   }
   const ep_mesh *mesh = &session.shapes.shape[0].mesh;
   sweep w = {.cli = cli,
@@ -407,7 +412,7 @@ ep_status ep_command_compare(const ep_cli *cli, ep_error *err) {
                         .tets = mesh->nt,
                         .examples = session.shapes.examples,
                         .diagonal = ep_mesh_diagonal(mesh)}};
-  ep_status status = do_all(&w, err);
+  status = do_all(&w, err);
   if (status == EP_OK) status = output(&w, err);
   if (w.petsc) ep_petsc_stop();
   for (int i = 0; i < w.result.count && w.result.point; i++) free(w.result.point[i].error_at);

@@ -293,11 +293,31 @@ static void mistakes_are_named(void **state) {
   }
 }
 
+// What a comparison does not measure is refused, not left out.
+static void unknown_parts_are_refused(void **state) {
+  (void)state;
+  static const struct {
+    const char *set, *expected;
+  } cases[] = {
+      {"obstacles=[{plane: {point: [0, -1, 0], normal: [0, 1, 0]}}]", "obstacles"},
+      {"fixed=[]", "free objects"},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    char call[256];
+    snprintf(call, sizeof call, "beam.yaml -q --cache sweep-cache --set families=[] --set '%s'",
+             cases[i].set);
+    assert_int_equal(command(call), EP_ERR_UNSUPPORTED);
+    char *said = text_of("err.txt");
+    if (!strstr(said, cases[i].expected)) fail_msg("%s: %s", cases[i].set, said);
+    free(said);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(errors_are_what_they_say), cmocka_unit_test(crossover_of_power_laws),
       cmocka_unit_test(budgets_decide),           cmocka_unit_test(the_program_compares),
-      cmocka_unit_test(mistakes_are_named),
+      cmocka_unit_test(mistakes_are_named),       cmocka_unit_test(unknown_parts_are_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
