@@ -69,7 +69,7 @@ static void all_tell_of_the_same_cases(void **state) {
   int rows = -1;
   for (const char *c = table; *c; c++) rows += *c == '\n';
   assert_int_equal(rows, 20);
-  assert_non_null(strstr(page, "<h2>start</h2>"));
+  assert_non_null(strstr(page, "<h2>Start inverted"));
   assert_non_null(strstr(record, "\"axis\": \"strength\""));
   assert_false(ep_path_exists("report/failures")); // there was none
   free(page);
