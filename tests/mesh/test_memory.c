@@ -1,6 +1,8 @@
 // Each allocation of reading, copying and extracting the surface is made to fail once: the status
 // is EP_ERR_MEMORY (or the file's own error wins), nothing is left half made, nothing leaks where
 // the sanitizer looks. The linker sends malloc, calloc and realloc of the library through here.
+#include "mesh/repair.h"
+#include "mesh/topology.h"
 #include "tests/mesh/bytes.h"
 
 void *__real_malloc(size_t size);
@@ -54,7 +56,17 @@ static const struct {
      "</DataArray></Cells></Piece></VTKFile>"},
 };
 
-// Parse, copy, surface; on failure everything made so far is freed.
+static ep_status examine(const ep_mesh *m, ep_error *err) {
+  ep_mesh_topology topology;
+  ep_mesh_repairs repairs = {.largest_only = true};
+  ep_mesh repaired;
+  EP_TRY(ep_mesh_examine(m, &topology, err));
+  EP_TRY(ep_mesh_repair(m, &repairs, &repaired, NULL, err));
+  ep_mesh_free(&repaired);
+  return EP_OK;
+}
+
+// Parse, copy, surface, examine, repair; on failure everything made so far is freed.
 static ep_status chain(size_t which, ep_error *err) {
   ep_mesh m, copy;
   int count, *triangle;
@@ -64,6 +76,7 @@ static ep_status chain(size_t which, ep_error *err) {
   if (status == EP_OK) {
     status = ep_mesh_surface(&copy, &count, &triangle, err);
     free(triangle);
+    if (status == EP_OK) status = examine(&copy, err);
     ep_mesh_free(&copy);
   }
   ep_mesh_free(&m);
