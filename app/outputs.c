@@ -305,6 +305,27 @@ static void text_weights(FILE *out, const json_t *report) {
             number(report, "example_fraction"));
 }
 
+static void text_vector(FILE *out, const json_t *list, size_t first) {
+  for (size_t i = 0; i < 3; i++)
+    fprintf(out, "%s%.4g", i ? ", " : "(", json_number_value(json_array_get(list, first + i)));
+  fprintf(out, ")");
+}
+
+// Of a free object: where it is, and its momenta from start to end.
+static void text_motion(FILE *out, const json_t *report) {
+  const json_t *momentum = json_object_get(report, "momentum");
+  if (!momentum) return;
+  fprintf(out, "free: centre of mass ends at ");
+  text_vector(out, json_object_get(report, "center"), 0);
+  for (size_t part = 0; part < 6; part += 3) {
+    fprintf(out, part ? " kg m/s, angular " : " m; momentum ");
+    text_vector(out, json_object_get(momentum, "start"), part);
+    fprintf(out, " -> ");
+    text_vector(out, json_object_get(momentum, "end"), part);
+  }
+  fprintf(out, " kg m^2/s\n");
+}
+
 void ep_summary_text(FILE *out, const json_t *report) {
   size_t index;
   json_t *stage;
@@ -324,6 +345,7 @@ void ep_summary_text(FILE *out, const json_t *report) {
           number(report, "steps_done"), number(report, "steps"), number(report, "dt"),
           number(report, "t_step_ms"), number(report, "t_interp_ms"));
   text_weights(out, report);
+  text_motion(out, report);
   const json_t *contact = json_object_get(report, "contact");
   if (contact)
     fprintf(out, "contact: up to %.0f vertices touch; deepest %.3g m, %.2f %% of the diagonal\n",

@@ -131,6 +131,13 @@ static json_t *make_report(const ep_session *session, const ep_model_file *file,
     json_object_set_new(report, "green_weights",
                         ep_json_numbers(k, record->green_weights + (size_t)last * (size_t)k));
   }
+  if (record->frame && last >= 0) {
+    const double *from = record->momentum, *to = from + 6 * (size_t)last;
+    json_object_set_new(report, "center", ep_json_numbers(3, record->frame[last].c));
+    json_object_set_new(
+        report, "momentum",
+        json_pack("{s:o, s:o}", "start", ep_json_numbers(6, from), "end", ep_json_numbers(6, to)));
+  }
   json_object_set_new(report, "cubature_error",
                       json_pack("{s:o, s:o}", "train", ep_json_number(file->train_error),
                                 "held_out", ep_json_number(file->held_out_error)));
