@@ -182,9 +182,8 @@ static ep_status match_once(job *j, ep_trial *t, ep_error *err) {
     EP_TRY(ep_trial_run(&j->from, &j->to, &rule, REFRAME_ROUNDS, t, err));
   }
   t->rounds += chosen->rounds;
-  // Plain neighbours know nothing of landmarks and regions.
-  const bool guided = j->options->landmarks || j->use;
-  if (t->cycle > CYCLE_FALLBACK && !guided) EP_TRY(try_plain(j, t, err));
+  // Plain neighbours know nothing of landmarks. Regions may be in wrong order: then they help.
+  if (t->cycle > CYCLE_FALLBACK && !j->options->landmarks) EP_TRY(try_plain(j, t, err));
   return EP_OK;
 }
 
