@@ -386,11 +386,12 @@ static ep_status check_known(const ep_session *session, ep_error *err) {
   if (session->shapes.nfixed == 0)
     return ep_fail(err, EP_ERR_UNSUPPORTED,
                    "compare does not follow free objects yet; compare the object held by `fixed`");
-  if (scene->nobstacles > 0 || scene->ndrags > 0)
-    return ep_fail(err, EP_ERR_UNSUPPORTED,
-                   "%s: compare knows neither obstacles nor drags in this version; take them out "
-                   "(--set obstacles=[])",
-                   scene->path);
+  if (scene->nobstacles > 0 || scene->ndrags > 0 || scene->npressures > 0)
+    return ep_fail(
+        err, EP_ERR_UNSUPPORTED,
+        "%s: compare knows no obstacles, drags and pressure in this version; take them out "
+        "(--set obstacles=[])",
+        scene->path);
   return EP_OK;
 }
 

@@ -128,14 +128,22 @@ static ep_status read_loads(const ep_scene_reader *r, const raw_scene *raw, ep_s
   if (!raw->loads_count) return EP_OK;
   out->load = calloc(raw->loads_count, sizeof *out->load);
   out->drag = calloc(raw->loads_count, sizeof *out->drag);
-  if (!out->load || !out->drag) return ep_read_no_memory(r);
+  out->pressure = calloc(raw->loads_count, sizeof *out->pressure);
+  if (!out->load || !out->drag || !out->pressure) return ep_read_no_memory(r);
   for (unsigned i = 0; i < raw->loads_count; i++) {
     const raw_load *given = &raw->loads[i];
     ep_load *load = &out->load[out->nloads];
     char key[64];
     snprintf(key, sizeof key, "loads.%u", i);
-    if ((given->gravity != NULL) + (given->push != NULL) + (given->drag != NULL) != 1)
-      return ep_read_refuse(r, key, "give one of gravity, push, drag");
+    if ((given->gravity != NULL) + (given->push != NULL) + (given->drag != NULL) +
+            (given->pressure != NULL) !=
+        1)
+      return ep_read_refuse(r, key, "give one of gravity, push, drag, pressure");
+    if (given->pressure) {
+      snprintf(key, sizeof key, "loads.%u.pressure", i);
+      EP_TRY(ep_read_pressure(r, key, given->pressure, &out->pressure[out->npressures++]));
+      continue;
+    }
     if (given->drag) {
       snprintf(key, sizeof key, "loads.%u.drag", i);
       EP_TRY(ep_read_drag(r, key, given->drag, &out->drag[out->ndrags++]));
@@ -295,6 +303,8 @@ void ep_scene_free(ep_scene *scene) {
     free(scene->drag[i].path.key);
   }
   free(scene->drag);
+  for (int i = 0; i < scene->npressures; i++) free(scene->pressure[i].where.path);
+  free(scene->pressure);
   for (int i = 0; i < scene->nobstacles; i++) free(scene->obstacle[i].motion.key);
   free(scene->obstacle);
   free(scene->fixed);

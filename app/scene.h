@@ -89,6 +89,13 @@ typedef struct ep_load {
   double from, until, ramp; // [s]
 } ep_load;
 
+// Pressure on the surface, from outside where positive.
+typedef struct ep_scene_pressure {
+  bool selected; // else the whole surface
+  ep_selection where;
+  double pascal, from, until, ramp; // [Pa], [s]
+} ep_scene_pressure;
+
 // A damped spring that drags the centre of some vertices along a path.
 typedef struct ep_scene_drag {
   ep_selection where;
@@ -168,6 +175,8 @@ typedef struct ep_scene {
   ep_start start;     // all zero for a held object
   int nloads;
   ep_load *load;
+  int npressures;
+  ep_scene_pressure *pressure;
   int ndrags;
   ep_scene_drag *drag;
   int nobstacles;

@@ -176,3 +176,23 @@ ep_status ep_read_drag(const ep_scene_reader *r, const char *key, const raw_drag
                           out->from);
   return EP_OK;
 }
+
+ep_status ep_read_pressure(const ep_scene_reader *r, const char *key, const raw_pressure *raw,
+                           ep_scene_pressure *out) {
+  char part[112];
+  const raw_selection where = {.box = raw->box, .plane = raw->plane, .file = raw->file};
+  out->selected = raw->box || raw->plane || raw->file;
+  if (out->selected) EP_TRY(ep_read_selection(r, key, &where, &out->where));
+  snprintf(part, sizeof part, "%.80s.pascal", key);
+  EP_TRY(ep_read_number(r, part, &raw->pascal, 0, -1e12, 1e12, &out->pascal));
+  snprintf(part, sizeof part, "%.80s.from", key);
+  EP_TRY(ep_read_number(r, part, raw->from, 0, 0, 1e9, &out->from));
+  snprintf(part, sizeof part, "%.80s.until", key);
+  EP_TRY(ep_read_number(r, part, raw->until, 1e9, 0, 1e9, &out->until));
+  snprintf(part, sizeof part, "%.80s.ramp", key);
+  EP_TRY(ep_read_number(r, part, raw->ramp, 0, 0, 1e9, &out->ramp));
+  if (out->until <= out->from || 2 * out->ramp > out->until - out->from)
+    return ep_read_refuse(r, part, "rise and fall of %g s each do not fit between %g and %g s",
+                          out->ramp, out->from, out->until);
+  return EP_OK;
+}

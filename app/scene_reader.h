@@ -48,6 +48,8 @@ ep_status ep_read_contact(const ep_scene_reader *r, const raw_scene *raw, ep_sce
 ep_status ep_read_start(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out);
 ep_status ep_read_drag(const ep_scene_reader *r, const char *key, const raw_drag *raw,
                        ep_scene_drag *out);
+ep_status ep_read_pressure(const ep_scene_reader *r, const char *key, const raw_pressure *raw,
+                           ep_scene_pressure *out);
 // raw NULL: no turn.
 ep_status ep_read_turn(const ep_scene_reader *r, const char *key, const raw_turn *raw,
                        ep_turn *out);

@@ -239,10 +239,21 @@ static const cyaml_schema_field_t drag_fields[] = {
     CYAML_FIELD_BOOL_PTR("smooth", OPTIONAL, raw_drag, smooth),
     CYAML_FIELD_END,
 };
+static const cyaml_schema_field_t pressure_fields[] = {
+    PART(raw_pressure, box, box_fields),
+    PART(raw_pressure, plane, plane_fields),
+    TEXT(raw_pressure, file),
+    CYAML_FIELD_FLOAT("pascal", CYAML_FLAG_DEFAULT, raw_pressure, pascal),
+    NUMBER(raw_pressure, from),
+    NUMBER(raw_pressure, until),
+    NUMBER(raw_pressure, ramp),
+    CYAML_FIELD_END,
+};
 static const cyaml_schema_field_t load_fields[] = {
     CYAML_FIELD_SEQUENCE("gravity", OPTIONAL, raw_load, gravity, &number, 3, 3),
     PART(raw_load, push, push_fields),
     PART(raw_load, drag, drag_fields),
+    PART(raw_load, pressure, pressure_fields),
     CYAML_FIELD_END,
 };
 static const cyaml_schema_value_t load = {

@@ -106,11 +106,18 @@ typedef struct raw_drag {
   double stiffness, *damping, *from, *until;
   bool *smooth;
 } raw_drag;
+typedef struct raw_pressure {
+  raw_box *box;
+  raw_plane *plane;
+  char *file;
+  double pascal, *from, *until, *ramp;
+} raw_pressure;
 typedef struct raw_load {
   double *gravity; // 3
   unsigned gravity_count;
   raw_push *push;
   raw_drag *drag;
+  raw_pressure *pressure;
 } raw_load;
 typedef struct raw_turn {
   double axis[3], degrees;

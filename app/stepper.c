@@ -7,6 +7,7 @@
 #include "app/drags.h"
 #include "app/free_object.h"
 #include "app/obstacles.h"
+#include "app/pressures.h"
 #include "reduced/bake/nlopt_target.h"
 
 // The scene's interpolation solver with a clock around it.
@@ -29,6 +30,7 @@ struct ep_stepper {
   double *region_strength; // (regions) of a model with regions; NULL
   double *force;           // (r) of the step at hand
   ep_free_loads free;      // loads of a free object, instead of `load` and `force`
+  ep_pressures pressures;  // forces that follow the surface
   ep_springs drags;        // of the step at hand
   ep_obstacle *obstacle;   // (nobstacles) where they are in the step at hand
 };
@@ -61,11 +63,12 @@ static ep_status make_loads(ep_stepper *s, const ep_shapes *shapes, ep_error *er
 
 static void set_force(ep_stepper *s, double t, bool loads) {
   const int r = s->model->size.r;
+  if (s->force) memset(s->force, 0, (size_t)r * sizeof *s->force);
+  if (loads) ep_pressures_add(s->scene, &s->pressures, t, ep_state_q(s->state), s->force);
   if (s->model->size.rigid) {
     ep_free_loads_set(s->scene, &s->free, t, loads, &s->def);
     return;
   }
-  memset(s->force, 0, (size_t)r * sizeof *s->force);
   for (int i = 0; i < s->scene->nloads && loads; i++) {
     const double strength = ep_load_profile(&s->scene->load[i], t);
     for (int a = 0; a < r; a++) s->force[a] += strength * s->load[i * r + a];
@@ -126,6 +129,12 @@ static ep_status set_up(ep_stepper *s, const ep_shapes *shapes, ep_error *err) {
     EP_TRY(ep_nlopt_target_create(s->state, s->scene->algorithm, 0, &s->nlopt, err));
   EP_TRY(read_strengths(s, shapes, err));
   set_up_step(s);
+  EP_TRY(ep_pressures_make(s->scene, shapes, s->model, &s->pressures, err));
+  if (s->pressures.count && !s->force) { // of a free object: it turns with it
+    s->force = calloc((size_t)s->model->size.r, sizeof *s->force);
+    if (!s->force) return ep_fail(err, EP_ERR_MEMORY, "no memory for the pressure");
+    s->def.force = s->force;
+  }
   EP_TRY(ep_drags_make(s->scene, shapes, s->model, &s->drags, err));
   if (s->drags.count) {
     s->def.outer = ep_springs_energy;
@@ -152,6 +161,7 @@ void ep_stepper_close(ep_stepper *s) {
   ep_nlopt_target_free(s->nlopt);
   ep_free_loads_free(&s->free);
   ep_drags_free(&s->drags);
+  ep_pressures_free(&s->pressures);
   free(s->load);
   free(s->force);
   free(s->region_strength);
