@@ -230,7 +230,8 @@ static void page(FILE *out, const ep_stress_report *report) {
   fprintf(out, "<h1>Stress: ");
   ep_write_escaped(out, report->name);
   fprintf(out,
-          "</h1><p>%d cases in %.0f s: 60 steps with the scene's loads, 60 without loads and "
+          "</h1><p>%d cases in %.0f s: 60 steps with the scene's loads, 60 (from start states 300) "
+          "without loads and "
           "example force. In a cell: the value, the median of Newton iterations a step, inverted "
           "tets at "
           "the end. Point at one for its reason.</p><p class=key>",

@@ -6,7 +6,8 @@
 #include "app/simulate.h"
 #include "app/stress.h"
 
-enum { LOADED = 60, FREE = 60, STEPS = LOADED + FREE };
+// Steps with the scene's loads, and without; from a start state more, so that it can come to rest.
+enum { LOADED = 60, FREE = 60, RECOVERY = 300, STEPS = LOADED + RECOVERY };
 static const double growth_allowed = 1e-6;
 
 typedef struct run {
@@ -140,7 +141,8 @@ static ep_status steps(run *w, ep_error *err) {
   EP_TRY(ep_stress_begin(&w->bench, &w->result->what, err));
   w->result->inverted_start = ep_stress_inverted(&w->bench);
   bool go_on = true;
-  for (int step = 0; step < STEPS && go_on; step++) EP_TRY(one_step(w, step, &go_on, err));
+  const int count = LOADED + (w->result->what.axis == EP_STRESS_START ? RECOVERY : FREE);
+  for (int step = 0; step < count && go_on; step++) EP_TRY(one_step(w, step, &go_on, err));
   judge(w);
   return EP_OK;
 }

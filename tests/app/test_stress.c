@@ -49,7 +49,7 @@ static void nothing_breaks(void **state) {
   size_t index;
   json_t *entry;
   json_array_foreach(json_object_get(root, "cases"), index, entry) {
-    assert_true(number(entry, "steps") == 120 && number(entry, "newton_median") <= 10);
+    assert_true(number(entry, "steps") >= 120 && number(entry, "newton_median") <= 10);
     assert_true(number(entry, "energy_growth") <= 1e-6);
   }
   static const char *const starts[] = {"inverted", "point", "plane", "random", "far"};
