@@ -114,7 +114,7 @@ static void run_row(FILE *out, const ep_figure_run *run) {
   ep_write_escaped(out, run->label);
   fputs("</th>", out);
   if (!s) {
-    fputs("<td colspan=\"13\" class=\"failed\">failed</td></tr>\n", out);
+    fputs("<td colspan=\"14\" class=\"failed\">failed</td></tr>\n", out);
     return;
   }
   const double steps = number(s, "steps_done"), m = number(s, "m");
@@ -128,7 +128,8 @@ static void run_row(FILE *out, const ep_figure_run *run) {
   cell(out, "%.3f", number(s, "t_step_ms"));
   cell(out, "%.4g", 1e3 * number(s, "dt"));
   cell(out, "%.2f", steps > 0 ? number(s, "newton_iterations") / steps : NAN);
-  cell(out, "%.2f", 100 * number(s, "example_fraction"));
+  cell(out, "%.1f", 100 * number(s, "example_fraction_most"));
+  cell(out, "%.1f", 100 * number(s, "example_fraction"));
   cell(out, "%.2f", 100 * number(contact, "penetration_share"));
   cell(out, "%.0f", number(s, "inverted_tets"));
   fputs("</tr>\n", out);
@@ -163,7 +164,7 @@ static void full_row(FILE *out, const ep_figure_run *run) {
   cell(out, "%.4g", 1e-3 * number(full, "step_median_us"));
   cell(out, "%.4g", 1e3 * number(full, "dt"));
   cell(out, "%.2f", number(full, "newton_per_step"));
-  fputs("<td></td><td></td>", out);
+  fputs("<td></td><td></td><td></td>", out);
   cell(out, "%.0f", number(full, "inverted"));
   fputs("</tr>\n", out);
 }
@@ -180,24 +181,14 @@ static void paper_row(FILE *out, const ep_figure_paper *p) {
   cell(out, "%.0f", p->s);
   cell(out, "%.3g", p->t_interp);
   cell(out, "%.4g", p->t_total);
-  fputs("<td></td><td></td><td></td><td></td><td></td></tr>\n", out);
+  fputs("<td></td><td></td><td></td><td></td><td></td><td></td></tr>\n", out);
 }
 
 static void table(FILE *out, const ep_figure *figure) {
-  static const char *const heads[] = {"",
-                                      "vertices",
-                                      "tets",
-                                      "examples",
-                                      "m",
-                                      "r",
-                                      "s",
-                                      "t_interp [ms]",
-                                      "t_total [ms]",
-                                      "dt [ms]",
-                                      "Newton",
-                                      "example [%]",
-                                      "penetration [%]",
-                                      "inverted"};
+  static const char *const heads[] = {
+      "",           "vertices",        "tets",         "examples", "m",      "r",
+      "s",          "t_interp [ms]",   "t_total [ms]", "dt [ms]",  "Newton", "example, most [%]",
+      "at end [%]", "penetration [%]", "inverted"};
   fputs("<div class=\"scroll\"><table><thead><tr>", out);
   for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) fprintf(out, "<th>%s</th>", heads[i]);
   fputs("</tr></thead><tbody>\n", out);
@@ -229,7 +220,8 @@ static void head(FILE *out, const ep_figures *all) {
           all->runs - all->failed, all->runs);
   fputs("<p class=\"note\">Times: medians over the steps of a run on one core; t_total is a whole "
         "step, t_interp the interpolation of the examples in it. Newton: iterations per step. "
-        "Example: how far the final shape has gone from rest to the nearest example. Penetration: "
+        "Example: how far the object went from rest to an example, at most in the run and at its "
+        "end. Penetration: "
         "deepest, over the diagonal of the object. Inverted: most inverted tets after any step."
         "</p>\n",
         out);

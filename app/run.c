@@ -86,6 +86,16 @@ static json_t *region_names(const ep_session *session) {
   return list;
 }
 
+// The farthest any moment of the run has gone towards an example.
+static double farthest_fraction(const ep_model *model, const ep_record *record) {
+  double most = NAN;
+  for (int row = 0; row < record->rows; row++)
+    for (int i = 0; i < model->size.k; i++)
+      most = fmax(most,
+                  ep_example_fraction(model, record->q + (size_t)row * (size_t)model->size.r, i));
+  return most; // fmax passes NaN over
+}
+
 static void add_timing(json_t *report, const ep_record *record) {
   const int steps = record->rows > 0 ? record->rows - 1 : 0;
   json_object_set_new(report, "steps_done", json_integer(steps));
@@ -149,6 +159,8 @@ static json_t *make_report(const ep_session *session, const ep_model_file *file,
         report, "example_fractions",
         fractions(model, record->q + (size_t)last * (size_t)model->size.r, &largest));
   json_object_set_new(report, "example_fraction", ep_json_number(largest));
+  json_object_set_new(report, "example_fraction_most",
+                      ep_json_number(farthest_fraction(model, record)));
   json_object_set_new(report, "warnings", json_integer(session->log.warnings));
   json_object_set_new(report, "results", json_string(folder));
   return report;

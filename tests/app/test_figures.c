@@ -49,7 +49,8 @@ static void make_runs(void) {
   put("figures/p/good/summary.json",
       "{\"vertices\": 77, \"tets\": 123, \"examples\": 2, \"m\": 10, \"r\": 30, \"s\": 60,"
       " \"dt\": 0.01, \"steps_done\": 50, \"newton_iterations\": 125, \"t_step_ms\": 0.125,"
-      " \"t_interp_ms\": 0.0625, \"example_fraction\": 0.5, \"inverted_tets\": 0,"
+      " \"t_interp_ms\": 0.0625, \"example_fraction\": 0.5,\"example_fraction_most\": 0.875, "
+      "\"inverted_tets\": 0,"
       " \"contact\": {\"penetration_share\": 0.0042}}");
   put("figures/p/good/plan.json",
       "{\"stages\": [{\"name\": \"modes\", \"runs\": true, \"reason\": \"15 modes\"},"
@@ -82,6 +83,7 @@ static void the_page_shows_what_the_runs_left(void **state) {
                                        "<td>0.125</td>",
                                        "<td>2.50</td>" /* 125 iterations in 50 steps */,
                                        "<td>0.42</td>",
+                                       "<td>87.5</td><td>50.0</td>",
                                        "<td>4321</td>",
                                        "<td>41.5</td>",
                                        "<td>98</td>" /* the full space, ms */,
