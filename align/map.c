@@ -9,6 +9,9 @@
 // bases", recipe, step 3). Between poses of one family positions mislead more.
 static const double GAMMA_SHAPES = 4, GAMMA_FAMILY = 2;
 enum { FUNCTIONS_SHAPES = 12, FUNCTIONS_FAMILY = 20 };
+// Shapes of one family agree in their finer functions too. Mean error of nine maps rest <- pose
+// with 20, 30, 40, 60: .82, .64, .56, .48 per cent of the diagonal. Only the last rounds take them.
+enum { FINE_FAMILY = 40, FINE_STEP = 4 };
 static const double REGION_WEIGHT = 2; // measured useful: 1 to 3
 static const double MARK_WEIGHT = 2;
 // Skin goes to skin: where build differs the nearest point would lie inside. 1 and 4 measured the
@@ -210,6 +213,11 @@ static double fine_cycle(const job *j, const int *back, const int *tet, const do
 static ep_status make_finer(const job *j, ep_trial *t, int *tet, double *weight, ep_error *err) {
   ep_match_rule rule = rule_of(j);
   rule.refine = true;
+  if (j->options->same_family && rule.k < j->from.k) {
+    rule.first = rule.k + FINE_STEP < j->from.k ? rule.k + FINE_STEP : j->from.k;
+    rule.step = FINE_STEP;
+    rule.k = j->from.k;
+  }
   if (t->plain)
     EP_TRY(ep_match_plain(&j->from, &j->to, t->r, t->p, tet, weight, err));
   else
@@ -359,7 +367,7 @@ static ep_status check_shapes(const ep_shape *from, const ep_shape *to, const ep
 
 // Functions both sides can offer, as many as the recipe wants.
 static int functions_in_use(const ep_shape *from, const ep_shape *to, const ep_map_options *o) {
-  int k = o->same_family ? FUNCTIONS_FAMILY : FUNCTIONS_SHAPES;
+  int k = o->same_family ? FINE_FAMILY : FUNCTIONS_SHAPES;
   if (k < o->m) k = o->m;
   if (k > from->lb->m) k = from->lb->m;
   return k > to->lb->m ? to->lb->m : k;

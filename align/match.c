@@ -252,7 +252,7 @@ ep_status ep_match_levels(const ep_side *from, const ep_side *to, const double r
     status = match_level(&w, 0, p, err);
   }
   int first = rule->k < FIRST_FUNCTIONS ? rule->k : FIRST_FUNCTIONS;
-  if (rule->refine) first = rule->k;
+  if (rule->refine) first = rule->first ? rule->first : rule->k;
   for (int kk = first; kk <= rule->k && status == EP_OK;
        kk = kk < rule->k && kk + rule->step > rule->k ? rule->k : kk + rule->step)
     status = match_level(&w, kk, p, err);

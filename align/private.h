@@ -99,7 +99,8 @@ typedef struct ep_match_rule {
   double region_weight;     // weight of regions, 0 without
   double mark_weight;       // weight of landmarks, 0 without
   double skin_weight;       // weight of being on the boundary
-  bool refine;              // p is a map already: the last level only
+  bool refine;              // p is a map already: the last level only, or those from
+  int first;                // this number of functions on; 0: the last
   const unsigned char *use; // (regions) which take part, NULL: all
 } ep_match_rule;
 

@@ -18,7 +18,7 @@
 #include "linalg/petsc.h"
 #include "shapes.h"
 
-enum { SHAPES = 3, FUNCTIONS = 24 };
+enum { SHAPES = 3, FUNCTIONS = 40 };
 
 typedef struct data_set {
   test_shape s[SHAPES];

@@ -19,9 +19,8 @@
 #include "data_pairs.h"
 #include "linalg/dense.h"
 #include "linalg/petsc.h"
+#include "map_families.h"
 #include "tests/align/pairs.h"
-
-enum { M = 20, FUNCTIONS = 40 };
 
 // ZoomOut from the nearest neighbours' functional map of ZOOM_FIRST functions.
 enum { ZOOM_FIRST = 4, ZOOM_LAST = 20 };
@@ -84,31 +83,9 @@ static double nearest(const truth_pair *pair, int *tet, double *weight) {
   return pair_error(pair, tet, weight);
 }
 
-// Six landmarks of each body, in its parameters: corners of the bar; the flyer's nose, wing tips,
-// tail tips and fin; the beast's head, tail and feet.
-enum { MARKS = 6 };
-static const double BODY_MARKS[BODIES][MARKS][3] = {
-    [BODY_BAR] = {{0, 0, 0}, {6, 2, 2}, {0, 2, 2}, {6, 0, 0}, {3, 2, 1}, {3, 1, 2}},
-    [BODY_FLYER] =
-        {{12, 3, 7}, {6.5, 2.5, 14}, {6.5, 2.5, 0}, {1, 2.5, 10}, {1, 2.5, 4}, {0, 6, 7}},
-    [BODY_BEAST] = {{13, 6, 2}, {0, 4, 2}, {3, 0, 1}, {3, 0, 4}, {10, 0, 1}, {10, 0, 4}}};
-
-static void match(const truth_pair *pair, int landmarks, const ep_landmark *mark, ep_map *map) {
-  ep_map_options o = ep_default_map_options();
-  ep_error err = {0};
-  o.m = M;
-  if (o.m > pair->from.lb.m) o.m = pair->from.lb.m;
-  o.landmarks = landmarks;
-  o.landmark = mark;
-  if (ep_map_match(&pair->from.shape, &pair->to.shape, &o, NULL, map, &err) != EP_OK)
-    fail_msg("%s", err.text);
-}
-
-static const char *const VERDICTS[3] = {"good", "doubtful", "bad"};
-
 static void print_guided(const truth_pair *pair, const char *how, ep_map *map) {
   printf("%-24s %5s %5s  %8s %8s %8.2f  %-8s %5.3f  %s\n", how, "", "", "", "",
-         100 * pair_error(pair, map->tet, map->weight), VERDICTS[map->quality.verdict],
+         100 * pair_error(pair, map->tet, map->weight), BENCH_VERDICTS[map->quality.verdict],
          map->quality.cycle, map->quality.reasons);
   ep_map_free(map);
 }
@@ -120,7 +97,7 @@ static void match_regions(const truth_pair *pair, body which) {
   ep_error err = {0};
   ep_map_options o = ep_default_map_options();
   pair_regions(pair, which, &regions);
-  o.m = M;
+  o.m = BENCH_M;
   o.regions = &regions;
   if (ep_map_match(&pair->from.shape, &pair->to.shape, &o, NULL, &map, &err) != EP_OK)
     fail_msg("%s", err.text);
@@ -136,11 +113,11 @@ static void run(truth_pair *pair) {
   const double e_near = nearest(pair, tet, weight), e_zoom = zoomout(pair, tet, weight);
   ep_map map;
   const double start = ep_seconds();
-  match(pair, 0, NULL, &map);
+  bench_match(pair, 0, NULL, &map);
   const double seconds = ep_seconds() - start;
   printf("%-24s %5d %5d  %8.2f %8.2f %8.2f  %-8s %5.3f  %6.2f\n", pair->name, pair->from.mesh.nv,
          pair->to.mesh.nv, 100 * e_near, 100 * e_zoom, 100 * pair_error(pair, map.tet, map.weight),
-         VERDICTS[map.quality.verdict], map.quality.cycle, seconds);
+         BENCH_VERDICTS[map.quality.verdict], map.quality.cycle, seconds);
   ep_map_free(&map);
   free(tet);
   free(weight);
@@ -148,125 +125,17 @@ static void run(truth_pair *pair) {
 
 // Six landmarks, regions, and two landmarks on the example in a random rotation.
 static void run_guided(truth_pair *pair, body which) {
-  ep_landmark mark[MARKS];
+  ep_landmark mark[BENCH_MARK_COUNT];
   ep_map map;
-  for (int m = 0; m < MARKS; m++) mark[m] = pair_landmark_of(pair, BODY_MARKS[which][m]);
-  match(pair, MARKS, mark, &map);
+  for (int m = 0; m < BENCH_MARK_COUNT; m++)
+    mark[m] = pair_landmark_of(pair, BENCH_MARKS[which][m]);
+  bench_match(pair, BENCH_MARK_COUNT, mark, &map);
   print_guided(pair, "  with six landmarks", &map);
   if (which != BODY_BAR) match_regions(pair, which);
   pair_move(pair, (double[3]){0.3, -0.8, 0.52}, 137, 2.5, 1);
-  for (int m = 0; m < 2; m++) mark[m] = pair_landmark_of(pair, BODY_MARKS[which][m]);
-  match(pair, 2, mark, &map);
+  for (int m = 0; m < 2; m++) mark[m] = pair_landmark_of(pair, BENCH_MARKS[which][m]);
+  bench_match(pair, 2, mark, &map);
   print_guided(pair, "  turned, two landmarks", &map);
-}
-
-// What poses are used for is their motion: pose minus rest as the object's vertices see it. Mean
-// distance to the true motion over the diagonal, and that of the points themselves, in per cent.
-typedef struct pose_error {
-  double points, motion;
-} pose_error;
-
-static pose_error error_of(const truth_pair *rest, const ep_map *to_rest, const truth_pair *pose,
-                           const ep_mesh *pose_mesh, const ep_map *to_pose) {
-  const int n = rest->from.mesh.nv;
-  double *there = malloc(3 * (size_t)n * sizeof *there),
-         *here = malloc(3 * (size_t)n * sizeof *here);
-  pose_error e = {0};
-  assert_true(there && here);
-  ep_map_pull(to_pose, pose_mesh, 3, pose_mesh->x, there);
-  ep_map_pull(to_rest, &rest->to.mesh, 3, rest->to.mesh.x, here);
-  for (int i = 0; i < n; i++) {
-    double p2 = 0, m2 = 0;
-    for (int c = 0; c < 3; c++) {
-      const double there_off = there[3 * i + c] - pose->truth[3 * i + c];
-      p2 += there_off * there_off;
-      m2 += pow(there_off - (here[3 * i + c] - rest->truth[3 * i + c]), 2);
-    }
-    e.points += sqrt(p2);
-    e.motion += sqrt(m2);
-  }
-  const double unit = 100 / (n * ep_mesh_diagonal(pose_mesh));
-  free(there);
-  free(here);
-  return (pose_error){unit * e.points, unit * e.motion};
-}
-
-enum { POSES = 3 };
-typedef struct family {
-  const char *name;
-  body which;
-  placement object, rest, pose[POSES];
-} family;
-
-static const family FAMILIES[] = {
-    {"plane <- bird",
-     BODY_FLYER,
-     place_plane,
-     place_bird,
-     {place_bird_raised, place_bird_banked, place_bird_diving}},
-    {"beast <- other beast",
-     BODY_BEAST,
-     place_beast_stretched,
-     place_beast,
-     {place_beast_walking, place_beast_rearing, place_beast_curled}},
-    {"rod <- bar",
-     BODY_BAR,
-     place_rod,
-     place_bar,
-     {place_bar_bent, place_bar_twisted, place_bar_curled}},
-};
-
-// One pose of a family, whose rest shape is mapped by `first` already.
-static void compose(const family *f, int which, int marks, const truth_pair *rest,
-                    const ep_map *first, pose_error sum[2]) {
-  truth_pair pose, direct;
-  ep_map second, composed, independent;
-  ep_error err = {0};
-  ep_landmark mark[MARKS];
-  ep_map_options o = ep_default_map_options();
-  o.m = M;
-  o.same_family = true;
-  pair_of_bodies(f->name, f->which, 3, f->rest, 3, f->pose[which], FUNCTIONS, &pose);
-  pair_of_bodies(f->name, f->which, 2, f->object, 3, f->pose[which], FUNCTIONS, &direct);
-  for (int m = 0; m < marks; m++) mark[m] = pair_landmark_of(&direct, BODY_MARKS[f->which][m]);
-  match(&direct, marks, mark, &independent);
-  if (ep_map_match(&rest->to.shape, &pose.to.shape, &o, NULL, &second, &err) != EP_OK ||
-      ep_map_compose(first, &rest->to.mesh, &second, &pose.to.mesh, &composed, &err) != EP_OK)
-    fail_msg("%s", err.text);
-  const pose_error both[2] = {error_of(rest, first, &direct, &pose.to.mesh, &composed),
-                              error_of(rest, first, &direct, &direct.to.mesh, &independent)};
-  printf("  pose %d: points %.2f and %.2f, motion %.2f and %.2f; %s and %s\n", which + 1,
-         both[0].points, both[1].points, both[0].motion, both[1].motion,
-         VERDICTS[composed.quality.verdict], VERDICTS[independent.quality.verdict]);
-  for (int i = 0; i < 2; i++) {
-    sum[i].points += both[i].points / POSES;
-    sum[i].motion += both[i].motion / POSES;
-  }
-  ep_map_free(&second);
-  ep_map_free(&composed);
-  ep_map_free(&independent);
-  pair_free(&pose);
-  pair_free(&direct);
-}
-
-// Three poses, mapped through the family's rest shape and independently.
-static void run_family(const family *f, int marks) {
-  truth_pair rest;
-  ep_map first;
-  ep_landmark mark[MARKS];
-  pose_error sum[2] = {{0}};
-  pair_of_bodies(f->name, f->which, 2, f->object, 3, f->rest, FUNCTIONS, &rest);
-  for (int m = 0; m < marks; m++) mark[m] = pair_landmark_of(&rest, BODY_MARKS[f->which][m]);
-  match(&rest, marks, mark, &first);
-  printf("%s, %d landmarks: object <- rest %.2f\n", f->name, marks,
-         100 * pair_error(&rest, first.tet, first.weight));
-  for (int i = 0; i < POSES; i++) compose(f, i, marks, &rest, &first, sum);
-  printf("  mean: points composed %.2f, independent %.2f (ratio %.2f); motion composed %.2f, "
-         "independent %.2f (ratio %.2f)\n",
-         sum[0].points, sum[1].points, sum[0].points / sum[1].points, sum[0].motion, sum[1].motion,
-         sum[0].motion / sum[1].motion);
-  ep_map_free(&first);
-  pair_free(&rest);
 }
 
 typedef struct recipe {
@@ -301,10 +170,10 @@ static void large(const char *name, int refine_from, int refine_to) {
   ep_map map;
   struct rusage before, after;
   pair_of_bodies(name, BODY_BEAST, refine_from, place_beast, refine_to, place_beast_walking,
-                 FUNCTIONS, &pair);
+                 BENCH_FUNCTIONS, &pair);
   getrusage(RUSAGE_SELF, &before);
   const double start = ep_seconds();
-  match(&pair, 0, NULL, &map);
+  bench_match(&pair, 0, NULL, &map);
   const double seconds = ep_seconds() - start;
   getrusage(RUSAGE_SELF, &after);
   printf("%d -> %d vertices at m = %d: %.1f s (%.1f s of processors), error %.2f per cent, %s; "
@@ -312,7 +181,7 @@ static void large(const char *name, int refine_from, int refine_to) {
          "before the map\n",
          pair.from.mesh.nv, pair.to.mesh.nv, map.m, seconds,
          processor_seconds(&after) - processor_seconds(&before),
-         100 * pair_error(&pair, map.tet, map.weight), VERDICTS[map.quality.verdict],
+         100 * pair_error(&pair, map.tet, map.weight), BENCH_VERDICTS[map.quality.verdict],
          after.ru_maxrss / 1024, before.ru_maxrss / 1024);
   ep_map_free(&map);
   pair_free(&pair);
@@ -339,7 +208,7 @@ int main(int argc, char **argv) {
     const recipe *r = &RECIPES[i];
     truth_pair pair;
     if (!strstr(r->name, word)) continue;
-    pair_of_bodies(r->name, r->which, r->refine_from, r->from, r->refine_to, r->to, FUNCTIONS,
+    pair_of_bodies(r->name, r->which, r->refine_from, r->from, r->refine_to, r->to, BENCH_FUNCTIONS,
                    &pair);
     run(&pair);
     run_guided(&pair, r->which);
@@ -347,13 +216,13 @@ int main(int argc, char **argv) {
   }
   for (int i = 0; i < DATA_RECIPE_COUNT; i++) {
     truth_pair pair;
-    if (!strstr(DATA_RECIPES[i].name, word) || !pair_of_data(&DATA_RECIPES[i], FUNCTIONS, &pair))
+    if (!strstr(DATA_RECIPES[i].name, word) ||
+        !pair_of_data(&DATA_RECIPES[i], BENCH_FUNCTIONS, &pair))
       continue;
     run(&pair);
     pair_free(&pair);
   }
-  for (size_t i = 0; i < sizeof FAMILIES / sizeof *FAMILIES && strstr("composed", word); i++)
-    for (int marks = 0; marks <= MARKS; marks += MARKS) run_family(&FAMILIES[i], marks);
+  if (strstr("composed", word)) run_families();
   ep_petsc_stop();
   return 0;
 }
