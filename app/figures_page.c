@@ -7,7 +7,7 @@
 #include "results/chart.h"
 
 static const char STYLE[] =
-    "body{font:15px/1.5 system-ui,sans-serif;color:#1d2430;background:#fff;max-width:1240px;"
+    "body{font:15px/1.5 system-ui,sans-serif;color:#1d2430;background:#fff;max-width:1400px;"
     "margin:2rem auto;padding:0 1rem}h1{font-size:1.6rem;margin:0 0 .3rem}h2{font-size:1.25rem;"
     "margin:3rem 0 .3rem;border-top:2px solid #dde2e7;padding-top:1rem}h3{font-size:1rem;"
     "margin:0 0 .3rem;font-weight:600}p{margin:.4rem 0;max-width:62rem}"
