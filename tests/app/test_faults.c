@@ -71,6 +71,7 @@ static void assert_no_leftovers(const char *folder, const char *what) {
     fail_msg("%s: temporary files are left in %s: %s", what, folder, text_of("out.txt"));
 }
 
+#ifdef EP_FAILING_MALLOC // not under the sanitizers, which have an allocator of their own
 // ---- memory ------------------------------------------------------------------------------------
 
 static long allocations_of(const char *name, const char *format, const char *out,
@@ -124,6 +125,7 @@ static void the_baker_runs_out_of_memory(void **state) {
   fail_many("eigenpose-bake", 16);
 }
 
+#endif
 // ---- disk --------------------------------------------------------------------------------------
 
 // A run in a file system of its own with `free` KiB beside the results of an earlier run, in a
