@@ -18,6 +18,7 @@
   X(w, sets + k)           /* weights of rest and examples, target of the last interpolation */   \
   X(target, sets * r)                                                                                    \
   X(shift, 3 * m)          /* what nonlinear interpolation adds to the blend: target.c */          \
+  X(next_shift, 3 * m)     /* and that of an interpolation under way */                            \
   X(k0_factor, r * r)      /* lower Cholesky factor of K0 */                                      \
   X(target_inverse, examples * sets * s * 9)  /* the target as undeformed shape: F_t^-1, w |det F_t| */   \
   X(target_weight, examples * sets * s)                                                                  \

@@ -95,11 +95,36 @@ static void aimed_ahead(void **unused) {
   bar_free(b);
 }
 
+// A target that is found at the step's start and kept in it must not feed motion: an object that
+// yields along its examples, let go on the way to one, swings less and less (by the damping of
+// implicit Euler alone).
+static void swinging_dies_out(void **unused) {
+  (void)unused;
+  bar *b = bar_create(6, 2, 2, R, 0, 4, EXAMPLES, EP_STVK_VOLUME);
+  void *block;
+  ep_state *state = bar_state(b, &block);
+  ep_step_def def = ep_default_step();
+  def.strength = 5;
+  def.relief = 0.9;
+  double swing[4] = {0}; // largest speed
+  const double origin[R] = {0};
+  for (int a = 0; a < R; a++) ep_state_q(state)[a] = 0.6 * b->model.example_q[a];
+  for (int i = 0; i < 1200; i++) {
+    assert_int_equal(ep_step(state, &def, NULL), EP_OK);
+    swing[i / 300] = fmax(swing[i / 300], distance(ep_state_velocity(state), origin, R));
+  }
+  if (!(swing[1] < 0.01 * swing[0] && swing[3] < 1e-6 * swing[0]))
+    fail_msg("%g, %g, %g, %g", swing[0], swing[1], swing[2], swing[3]);
+  free(block);
+  bar_free(b);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(shape_on_manifold_is_its_own_target),
       cmocka_unit_test(corners_need_no_shift),
       cmocka_unit_test(aimed_ahead),
+      cmocka_unit_test(swinging_dies_out),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
