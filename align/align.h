@@ -126,8 +126,8 @@ typedef struct ep_map_options {
 ep_map_options ep_default_map_options(void);
 
 // Product-space matching with reframing (DESIGN, measured recipe). Uses up to 12 functions, between
-// shapes of one family 40 (or m), where the spaces hold them; the coupling residuals up to 2m of
-// `to`: compute spaces of max(20, 2m), of max(40, 2m) within a family. Errors: EP_ERR_ARGUMENT (m
+// shapes of one family 32 (or m), where the spaces hold them; the coupling residuals up to 2m of
+// `to`: compute spaces of max(20, 2m), of max(32, 2m) within a family. Errors: EP_ERR_ARGUMENT (m
 // larger than the spaces), EP_ERR_MATCH (component counts differ). A bad map is no error here: the
 // verdict says so, the caller decides.
 ep_status ep_map_match(const ep_shape *from, const ep_shape *to, const ep_map_options *options,
