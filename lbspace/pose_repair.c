@@ -19,7 +19,8 @@
 
 static const double WEIGHT_FIRST = 10, WEIGHT_LAST = 1e6, WEIGHT_GROWTH = 10;
 static const double SETTLED = 1e-3; // relative decrease of the objective: go on to the next weight
-enum { HALVINGS = 12, ACTIVE_MOST = 4000 };
+static const double UNFOLDED = 0.4; // smallest singular value of F after unfolding
+enum { HALVINGS = 12, ACTIVE_MOST = 4000, UNFOLDINGS = 4 };
 
 ep_repair_options ep_default_repair_options(void) {
   return (ep_repair_options){.m = 10, .floor = 0.05, .target = 0.12, .iterations = 60};
@@ -248,9 +249,8 @@ static bool whole(const repair *r) {
   return true;
 }
 
-static ep_status iterate(repair *r, int *iterations, ep_error *err) {
-  r->w = WEIGHT_FIRST;
-  for (*iterations = 0; *iterations < r->o->iterations && !whole(r); ++*iterations) {
+static ep_status descend(repair *r, int *iterations, ep_error *err) {
+  for (; *iterations < r->o->iterations && !whole(r); ++*iterations) {
     double decrease;
     EP_TRY(find_active(r, err));
     if (r->active > ACTIVE_MOST) return EP_OK; // no pose any more: the report says so
@@ -259,6 +259,84 @@ static ep_status iterate(repair *r, int *iterations, ep_error *err) {
     if (decrease >= SETTLED) continue;
     if (r->w >= WEIGHT_LAST) return EP_OK;
     r->w *= WEIGHT_GROWTH;
+  }
+  return EP_OK;
+}
+
+// ---- unfolding ---------------------------------------------------------------------------------
+
+// F of tet e with its singular values no less than UNFOLDED, right way round.
+static ep_status unfolded(const repair *r, int e, double *out, ep_error *err) {
+  const double *shape = r->solver.gradient + 12 * (size_t)e;
+  const int *v = r->mesh->tet + 4 * (size_t)e;
+  double f[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, left[9], s[3], right[9];
+  for (int i = 0; i < 4; i++)
+    for (int k = 0; k < 9; k++) {
+      const size_t at = 3 * (size_t)v[i] + (size_t)(k / 3);
+      f[k] += (r->u0[at] + r->delta[at]) * shape[3 * i + k % 3];
+    }
+  const bool inverted = jacobian(r, e, r->delta, NULL) < 0;
+  EP_TRY(ep_svd(3, 3, f, left, s, right, err));
+  if (inverted) // the shortest axis points the wrong way
+    for (int k = 0; k < 3; k++) left[3 * k + 2] = -left[3 * k + 2];
+  for (int i = 0; i < 9; i++) {
+    out[i] = 0;
+    for (int k = 0; k < 3; k++)
+      out[i] += left[3 * (i / 3) + k] * fmax(s[k], UNFOLDED) * right[3 * k + i % 3];
+  }
+  return EP_OK;
+}
+
+// Adds where tet e wants its vertices (delta) to sum (n x 3) and counts them.
+static ep_status want(const repair *r, int e, double *sum, int *count, ep_error *err) {
+  const int *v = r->mesh->tet + 4 * (size_t)e;
+  double f[9], rest[3] = {0, 0, 0}, now[3] = {0, 0, 0};
+  EP_TRY(unfolded(r, e, f, err));
+  for (int i = 0; i < 4; i++)
+    for (int k = 0; k < 3; k++) {
+      const size_t at = 3 * (size_t)v[i] + (size_t)k;
+      rest[k] += r->mesh->x[at] / 4;
+      now[k] += (r->mesh->x[at] + r->u0[at] + r->delta[at]) / 4;
+    }
+  for (int i = 0; i < 4; i++) {
+    count[v[i]]++;
+    for (int k = 0; k < 3; k++) {
+      const size_t at = 3 * (size_t)v[i] + (size_t)k;
+      double x = now[k];
+      for (int c = 0; c < 3; c++)
+        x += f[3 * k + c] * (r->mesh->x[3 * (size_t)v[i] + (size_t)c] - rest[c]);
+      sum[at] += x - r->mesh->x[at] - r->u0[at];
+    }
+  }
+  return EP_OK;
+}
+
+// A tet pressed onto a line has no derivative of its volume to go by. So the tets left below the
+// floor are opened by themselves, each vertex to the mean of what its tets want; the descent then
+// goes on from there at the last weight.
+static ep_status unfold(repair *r, ep_error *err) {
+  const size_t n = (size_t)r->mesh->nv;
+  double *sum = calloc(3 * n, sizeof *sum);
+  int *count = calloc(n, sizeof *count);
+  ep_status status = sum && count ? EP_OK : no_memory(r, err);
+  for (int e = 0; e < r->mesh->nt && status == EP_OK; e++)
+    if (!(jacobian(r, e, r->delta, NULL) >= r->o->floor)) status = want(r, e, sum, count, err);
+  for (size_t i = 0; i < 3 * n && status == EP_OK; i++)
+    if (count[i / 3] && !(r->o->held && r->o->held[i / 3])) r->delta[i] = sum[i] / count[i / 3];
+  free(sum);
+  free(count);
+  return status;
+}
+
+static ep_status iterate(repair *r, int *iterations, ep_error *err) {
+  r->w = WEIGHT_FIRST;
+  *iterations = 0;
+  EP_TRY(descend(r, iterations, err));
+  for (int i = 0; i < UNFOLDINGS && !whole(r) && r->active <= ACTIVE_MOST; i++) {
+    int more = 0;
+    EP_TRY(unfold(r, err));
+    EP_TRY(descend(r, &more, err));
+    *iterations += more;
   }
   return EP_OK;
 }
