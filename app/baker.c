@@ -4,10 +4,10 @@
 
 #include "app/blas_core.h"
 #include "app/commands.h"
-#include "app/compare.h"
-#include "app/quality_json.h"
+#include "app/compare/compare.h"
+#include "app/maps/quality_json.h"
 #include "app/report.h"
-#include "app/stress.h"
+#include "app/stress/stress.h"
 
 // ---- bake ------------------------------------------------------------------------------------
 

@@ -2,8 +2,8 @@
 #ifndef EP_APP_COMMANDS_H
 #define EP_APP_COMMANDS_H
 
-#include "app/bake.h"
-#include "app/session.h"
+#include "app/bake/bake.h"
+#include "app/plan/session.h"
 
 // eigen MESH [--out F.vtu]: eigenvalues on stdout; the eigenfunctions into F.vtu, and F.png with
 // the first of them inside the volume.

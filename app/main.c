@@ -1,9 +1,9 @@
 // The command `eigenpose`. It links neither PETSc nor SLEPc: what needs them is done by the baker,
 // a program of its own in libexec.
-#include "app/check.h"
+#include "app/check/check.h"
 #include "app/commands.h"
 #include "app/process.h"
-#include "app/run.h"
+#include "app/run/run.h"
 
 static ep_status perform(const ep_cli *cli, char **argv, bool *found, ep_error *err) {
   switch (cli->command) {

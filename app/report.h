@@ -4,7 +4,7 @@
 
 #include <jansson.h>
 
-#include "app/plan.h"
+#include "app/plan/plan.h"
 
 // All makers return NULL without memory; json_decref what they return.
 

@@ -15,7 +15,7 @@
 #include <cmocka.h>
 // clang-format on
 
-#include "app/cache.h"
+#include "app/plan/cache.h"
 
 static const double numbers[6] = {1, -2, 3.5, 0, 1e300, -0.25};
 static const int whole[2] = {3, -4};

@@ -20,7 +20,7 @@
 #include <cmocka.h>
 // clang-format on
 
-#include "app/compare.h"
+#include "app/compare/compare.h"
 #include "box.h"
 
 #define ASSERT_OK(call)                                                                            \

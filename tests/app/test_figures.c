@@ -15,7 +15,7 @@
 // clang-format on
 #include <dirent.h>
 
-#include "app/figures.h"
+#include "app/figures/figures.h"
 #include "base/files.h"
 
 static void put(const char *path, const char *text) {

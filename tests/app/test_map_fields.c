@@ -13,9 +13,9 @@
 #include <cmocka.h>
 // clang-format on
 
-#include "app/map_fields.h"
-#include "app/plan.h"
-#include "app/select.h"
+#include "app/plan/plan.h"
+#include "app/scene/map_fields.h"
+#include "app/scene/select.h"
 #include "box.h"
 #include "mesh/io.h"
 

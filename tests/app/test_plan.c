@@ -10,7 +10,7 @@
 #include <cmocka.h>
 // clang-format on
 
-#include "app/plan.h"
+#include "app/plan/plan.h"
 #include "box.h"
 
 typedef struct planned {

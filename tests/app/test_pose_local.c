@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "app/pose_local.h"
+#include "app/bake/pose_local.h"
 #include "box.h"
 #include "mesh/io.h"
 

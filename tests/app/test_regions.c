@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "app/regions.h"
+#include "app/scene/regions.h"
 #include "box.h"
 #include "mesh/io.h"
 

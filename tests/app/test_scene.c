@@ -10,8 +10,8 @@
 #include <cmocka.h>
 // clang-format on
 
-#include "app/scene.h"
-#include "app/select.h"
+#include "app/scene/scene.h"
+#include "app/scene/select.h"
 #include "box.h"
 #include "mesh/io.h"
 

@@ -9,8 +9,8 @@
 #include <cmocka.h>
 // clang-format on
 
-#include "app/loads.h"
-#include "app/simulate.h"
+#include "app/run/loads.h"
+#include "app/run/simulate.h"
 
 static void profile_is_a_trapezoid(void **state) {
   (void)state;

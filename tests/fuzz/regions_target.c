@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "align/align.h"
-#include "app/select.h"
+#include "app/scene/select.h"
 #include "tests/fuzz/target.h"
 
 // A box of 8 vertices and 6 tets; with `gap` file numbers 2, 4, .., so that every other is unused.

@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "app/landmarks.h"
-#include "app/scene.h"
+#include "app/scene/landmarks.h"
+#include "app/scene/scene.h"
 
 // Scenes of the project name their meshes relative to this folder.
 static const char folder[] = EP_SOURCE_DIR "/data/scenes";

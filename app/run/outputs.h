@@ -1,0 +1,22 @@
+// The files a run leaves: frames, animation, picture, tables, summary.
+#ifndef EP_APP_RUN_OUTPUTS_H
+#define EP_APP_RUN_OUTPUTS_H
+
+#include <jansson.h>
+
+#include "app/run/simulate.h"
+
+// Write what scene->formats asks for into `folder` (made if needed), plus trajectory.csv. A record
+// cut short by a failure is written as far as it goes.
+//   frames/frame-0000.vtu .. and animation.pvd; animation.glb; strip.png, final.png
+ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_shapes *shapes,
+                           const ep_model *model, const ep_record *record, ep_log *log,
+                           ep_error *err);
+
+// summary.json (the report as printed by --json) and summary.txt.
+ep_status ep_outputs_summary(const char *folder, const json_t *report, ep_error *err);
+
+// The lines of summary.txt into an open stream.
+void ep_summary_text(FILE *out, const json_t *report);
+
+#endif

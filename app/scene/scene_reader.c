@@ -1,0 +1,110 @@
+#include "app/scene/scene_reader.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/files.h"
+
+ep_status ep_read_refuse(const ep_scene_reader *r, const char *key, const char *format, ...) {
+  char text[512];
+  va_list args;
+  va_start(args, format);
+  vsnprintf(text, sizeof text, format, args);
+  va_end(args);
+  int line, column;
+  ep_yaml_locate(&r->loaded->yaml, key, &line, &column);
+  return ep_fail(r->err, EP_ERR_SCENE, "%s:%d:%d: %s: %s%s", r->name, line, column, key, text,
+                 r->overridden ? " (with --set)" : "");
+}
+
+ep_status ep_read_number(const ep_scene_reader *r, const char *key, const double *given,
+                         double fallback, double low, double high, double *out) {
+  *out = given ? *given : fallback;
+  if (!isfinite(*out) || *out < low || *out > high)
+    return ep_read_refuse(r, key, "%g is out of range; use %g to %g", *out, low, high);
+  return EP_OK;
+}
+
+ep_status ep_read_whole(const ep_scene_reader *r, const char *key, const double *given,
+                        int fallback, int low, int high, int *out) {
+  double value;
+  EP_TRY(ep_read_number(r, key, given, fallback, low, high, &value));
+  if (value != floor(value)) return ep_read_refuse(r, key, "%g is not a whole number", value);
+  *out = (int)value;
+  return EP_OK;
+}
+
+ep_status ep_read_vector(const ep_scene_reader *r, const char *key, const double *given,
+                         double *out) {
+  for (int i = 0; i < 3; i++) {
+    if (!isfinite(given[i]) || fabs(given[i]) > 1e30)
+      return ep_read_refuse(r, key, "component %d is %g; use finite numbers", i, given[i]);
+    out[i] = given[i];
+  }
+  return EP_OK;
+}
+
+ep_status ep_read_text(const ep_scene_reader *r, const char *text, char **out) {
+  *out = strdup(text);
+  return *out ? EP_OK : ep_fail(r->err, EP_ERR_MEMORY, "no memory for the scene");
+}
+
+ep_status ep_read_file(const ep_scene_reader *r, const char *key, const char *path, char **out) {
+  char joined[EP_PATH_MAX];
+  EP_TRY(ep_path_join(r->folder, path, joined, r->err));
+  if (!ep_path_exists(joined)) return ep_read_refuse(r, key, "there is no file %s", joined);
+  return ep_read_text(r, joined, out);
+}
+
+// An array of the object's vertices; whether the mesh has it shows when the mesh is read.
+static ep_status field_selection(const ep_scene_reader *r, const char *key,
+                                 const raw_selection *raw, ep_selection *out) {
+  char part[96];
+  out->kind = EP_SELECT_FIELD;
+  out->equals = raw->equals != NULL;
+  snprintf(part, sizeof part, "%.63s.%s", key, out->equals ? "equals" : "above");
+  if (raw->above && raw->equals) return ep_read_refuse(r, key, "give one of above, equals");
+  EP_TRY(ep_read_number(r, part, out->equals ? raw->equals : raw->above, 0.5, -1e300, 1e300,
+                        &out->value));
+  return ep_read_text(r, raw->field, &out->path);
+}
+
+ep_status ep_read_selection(const ep_scene_reader *r, const char *key, const raw_selection *raw,
+                            ep_selection *out) {
+  const raw_box *box = raw->box;
+  const raw_plane *plane = raw->plane;
+  snprintf(out->key, sizeof out->key, "%s", key);
+  if (!!box + !!plane + !!raw->file + !!raw->field != 1)
+    return ep_read_refuse(r, key, "give one of box, plane, file, field");
+  if (raw->field) return field_selection(r, key, raw, out);
+  if (raw->above || raw->equals) return ep_read_refuse(r, key, "above and equals need a field");
+  if (raw->file) {
+    out->kind = EP_SELECT_FILE;
+    return ep_read_file(r, key, raw->file, &out->path);
+  }
+  out->kind = box ? EP_SELECT_BOX : EP_SELECT_PLANE;
+  EP_TRY(ep_read_vector(r, key, box ? box->low : plane->point, out->a));
+  EP_TRY(ep_read_vector(r, key, box ? box->high : plane->normal, out->b));
+  for (int i = 0; box && i < 3; i++)
+    if (out->a[i] > out->b[i])
+      return ep_read_refuse(r, key, "box: low %g lies above high %g on axis %d", out->a[i],
+                            out->b[i], i);
+  if (plane && out->b[0] == 0 && out->b[1] == 0 && out->b[2] == 0)
+    return ep_read_refuse(r, key, "plane: the normal is zero");
+  return EP_OK;
+}
+
+ep_status ep_read_no_memory(const ep_scene_reader *r) {
+  return ep_fail(r->err, EP_ERR_MEMORY, "no memory for the scene");
+}
+
+ep_status ep_read_algorithm(const ep_scene_reader *r, const char *key, const char *name,
+                            char out[48]) {
+  if (strncmp(name, "LD_", 3) != 0 || strlen(name) > 47)
+    return ep_read_refuse(
+        r, key, "'%.60s' is no local algorithm with gradients; use one as LD_LBFGS", name);
+  snprintf(out, 48, "%s", name);
+  return EP_OK;
+}
