@@ -6,7 +6,7 @@
 #include "app/scene/hash_text.h"
 
 // Raised whenever a comparison measures something else.
-enum { COMPARE_VERSION = 2 };
+enum { COMPARE_VERSION = 3 };
 
 int ep_weight_sets(int path) {
   return (path & EP_METHOD_LB ? 1 : 0) + (path & EP_METHOD_GREEN ? 1 : 0);
