@@ -83,6 +83,8 @@ static void bounds_of_run(const ep_mesh *mesh, const ep_model *model, const ep_r
 static ep_status make_solids(const ep_scene *scene, const ep_mesh *mesh, const ep_model *model,
                              const ep_record *record, ep_solids *out, ep_error *err) {
   double low[3], high[3];
+  *out = (ep_solids){0};
+  if (!scene->nobstacles) return EP_OK;
   double *x = malloc(3 * (size_t)mesh->nv * sizeof *x);
   if (!x) return no_memory(err);
   bounds_of_run(mesh, model, record, x, low, high);
