@@ -18,6 +18,7 @@
 
 #include "base/files.h"
 #include "box.h"
+#include "program.h"
 
 #define HEAD                                                                                       \
   "schema: 1\nobject: {mesh: a-beam.veg}\n"                                                        \
@@ -25,33 +26,10 @@
   "reduction: {eigenfunctions: 5, modes: 8, linear_modes: 5, path_samples: 2, elements: 15,\n"     \
   "  training_poses: 20, amplitude: 0.1}\n"
 
-static int command(const char *format, ...) __attribute__((format(printf, 1, 2)));
-static int command(const char *format, ...) {
-  char line[4096];
-  const int used = snprintf(line, sizeof line, "%s ", EP_COMMAND);
-  va_list args;
-  va_start(args, format);
-  vsnprintf(line + used, sizeof line - (size_t)used, format, args);
-  va_end(args);
-  strncat(line, " >a-out.txt 2>a-err.txt", sizeof line - strlen(line) - 1);
-  const int status = system(line);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
-
-static char *errors(void) {
-  char *text;
-  size_t size;
-  ep_error err = {0};
-  if (ep_file_read("a-err.txt", &text, &size, &err) != EP_OK) fail_msg("%s", err.text);
-  return text;
-}
-
-static json_t *report(int code) {
-  json_error_t trouble;
-  if (code != 0) fail_msg("exit code %d: %s", code, errors());
-  json_t *root = json_load_file("a-out.txt", 0, &trouble);
-  if (!root) fail_msg("stdout is no JSON object: %s", trouble.text);
-  return root;
+// The report of a command that ended well.
+static json_t *good_report(int code) {
+  if (code != 0) fail_msg("exit code %d: %s", code, text_of("err.txt"));
+  return report();
 }
 
 static json_t *entry(const json_t *root, const char *list, size_t index) {
@@ -60,15 +38,9 @@ static json_t *entry(const json_t *root, const char *list, size_t index) {
   return found;
 }
 
-static double number(const json_t *object, const char *key) {
-  const json_t *value = json_object_get(object, key);
-  if (!json_is_number(value)) fail_msg("no number '%s'", key);
-  return json_number_value(value);
-}
-
 static void the_record_is_whole(void **state) {
   (void)state;
-  json_t *root = report(command("align a-map.yaml --json --cache a-cache-1 --out a-one"));
+  json_t *root = good_report(program("", "align a-map.yaml --json --cache a-cache-1 --out a-one"));
   assert_int_equal(json_array_size(json_object_get(root, "maps")), 2);
   static const char *const keys[] = {"name",
                                      "from",
@@ -116,48 +88,49 @@ static void pictures_and_fields_are_left(void **state) {
     if (!ep_path_exists(path)) fail_msg("%s is missing", path);
   }
   // from nothing, and from the cache: the same bytes, and the same record but for "cached"
-  assert_int_equal(command("align a-map.yaml --json --cache a-cache-2 --out a-two"), 0);
-  assert_int_equal(system("diff -r a-one a-two && cp a-out.txt a-first.txt"), 0);
-  assert_int_equal(command("align a-map.yaml --json --cache a-cache-2 --out a-three"), 0);
+  assert_int_equal(program("", "align a-map.yaml --json --cache a-cache-2 --out a-two"), 0);
+  assert_int_equal(system("diff -r a-one a-two && cp out.txt a-first.txt"), 0);
+  assert_int_equal(program("", "align a-map.yaml --json --cache a-cache-2 --out a-three"), 0);
   assert_int_equal(system("diff -r a-one a-three"), 0);
-  assert_int_equal(system("grep -v cached a-first.txt >a-x; grep -v cached a-out.txt | diff - a-x"),
+  assert_int_equal(system("grep -v cached a-first.txt >a-x; grep -v cached out.txt | diff - a-x"),
                    0);
-  assert_int_equal(command("eigen a-beam.veg --count 3 --out a-one/phi.vtu"), 0);
+  assert_int_equal(program("", "eigen a-beam.veg --count 3 --out a-one/phi.vtu"), 0);
   assert_true(ep_path_exists("a-one/phi.vtu") && ep_path_exists("a-one/phi.png"));
 }
 
 static void inverted_tets_are_repaired(void **state) {
   (void)state;
-  json_t *root = report(command("bake a-torn.yaml --json --cache a-cache-1"));
+  json_t *root = good_report(program("", "bake a-torn.yaml --json --cache a-cache-1"));
   const json_t *pose = entry(root, "examples", 0);
   assert_true(number(pose, "inverted_before_repair") >= 2);
   assert_true(number(pose, "inverted_tets") == 0 && number(pose, "crushed_tets") == 0);
   assert_true(number(pose, "worst_volume_ratio") >= 0.05);
   assert_true(number(pose, "repair_share") > 0 && number(pose, "repair_share") < 0.5);
   json_decref(root);
-  char *err = errors();
+  char *err = text_of("err.txt");
   if (!strstr(err, "repaired")) fail_msg("not said: %s", err);
   free(err);
 }
 
 static void hopeless_poses_are_refused_but_shown(void **state) {
   (void)state;
-  assert_int_equal(command("bake a-mirror.yaml --cache a-cache-1"), 6);
-  char *err = errors();
+  assert_int_equal(program("", "bake a-mirror.yaml --cache a-cache-1"), 6);
+  char *err = text_of("err.txt");
   if (!strstr(err, "another pose") || !strstr(err, "f/a-mirror")) fail_msg("'%s'", err);
   free(err);
-  json_t *root = report(command("align a-mirror.yaml --json --cache a-cache-1 --out a-one"));
+  json_t *root =
+      good_report(program("", "align a-mirror.yaml --json --cache a-cache-1 --out a-one"));
   assert_true(number(entry(root, "poses", 0), "inverted_before_repair") > 100);
   assert_true(number(entry(root, "poses", 0), "repair_share") > 0.5);
   json_decref(root);
   assert_true(ep_path_exists("a-one/pose-f-a-mirror.png"));
   // looking at it must not make a later bake believe that it is in order
-  assert_int_equal(command("bake a-mirror.yaml --cache a-cache-1"), 6);
+  assert_int_equal(program("", "bake a-mirror.yaml --cache a-cache-1"), 6);
 }
 
 static void expect_failure(int code, const char *part, const char *arguments) {
-  const int got = command("%s", arguments);
-  char *err = errors();
+  const int got = program("", "%s", arguments);
+  char *err = text_of("err.txt");
   if (got != code || !strstr(err, part))
     fail_msg("%s: exit code %d (expected %d), '%s' (expected '%s')", arguments, got, code, err,
              part);
@@ -181,7 +154,8 @@ static json_t *align_data(const char *scene) {
     print_message("the shared data folder is absent\n");
     skip();
   }
-  return report(command("align %s/tests/scenes/%s --json --cache a-cache-1", EP_SOURCE_DIR, scene));
+  return good_report(
+      program("", "align %s/tests/scenes/%s --json --cache a-cache-1", EP_SOURCE_DIR, scene));
 }
 
 static void real_poses_have_no_inverted_tets(void **state) {
@@ -215,7 +189,7 @@ static void wrong_regions_are_named(void **state) {
     if (suspect != (i >= 12 && i <= 14)) fail_msg("region %zu: suspect %d", i + 1, suspect);
   }
   assert_true(number(entry(root, "poses", 0), "inverted_tets") == 0);
-  char *err = errors();
+  char *err = text_of("err.txt");
   if (!strstr(err, "left out: 13 (fits 14), 14 (fits 15), 15 (fits 13)")) fail_msg("'%s'", err);
   free(err);
   json_decref(root);

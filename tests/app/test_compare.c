@@ -22,6 +22,7 @@
 
 #include "app/compare/compare.h"
 #include "box.h"
+#include "program.h"
 
 #define ASSERT_OK(call)                                                                            \
   do {                                                                                             \
@@ -149,30 +150,7 @@ static const char scene_text[] =
     "compare: {modes: [4, 12], elements: [12], solvers: [newton, LD_SLSQP], budget: \"50 %\"}\n";
 
 static int command(const char *rest) {
-  char line[4096];
-  snprintf(line, sizeof line, "%s compare %s >out.txt 2>err.txt", EP_COMMAND, rest);
-  const int status = system(line);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
-
-static char *text_of(const char *path) {
-  char *text;
-  size_t size;
-  ASSERT_OK(ep_file_read(path, &text, &size, err));
-  return text;
-}
-
-static json_t *report(void) {
-  json_error_t trouble;
-  json_t *root = json_load_file("out.txt", 0, &trouble);
-  if (!root) fail_msg("stdout is no JSON object: %s\n%s", trouble.text, text_of("err.txt"));
-  return root;
-}
-
-static double number(const json_t *point, const char *key) {
-  const json_t *value = json_object_get(point, key);
-  if (!json_is_number(value)) fail_msg("a point lacks %s", key);
-  return json_number_value(value);
+  return program("", "compare %s", rest);
 }
 
 static const json_t *point_with(const json_t *root, const char *method, int r, const char *solver,
