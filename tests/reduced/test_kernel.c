@@ -14,6 +14,7 @@
 
 #include "reduced/kernel.h"
 #include "tests/reduced/bar.h"
+#include "tests/reduced/levels.h"
 
 static double norm(int n, const double *a) {
   double sum = 0;
@@ -70,13 +71,8 @@ static void lanes_equal_the_scalar_sum(void **state) {
 // One task, all kernels this processor runs.
 static void levels_give_the_same_bits(void **state) {
   (void)state;
-  ep_kernel kernels[3] = {ep_kernel_baseline};
-  int count = 1;
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) kernels[count++] = ep_kernel_avx2;
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
-    kernels[count++] = ep_kernel_avx512;
-#endif
+  ep_kernel kernels[LEVELS_MOST];
+  const int count = kernels_here(kernels);
   if (count == 1) {
     print_message("only the baseline kernel runs on this processor: nothing to compare\n");
     skip();
