@@ -15,8 +15,8 @@
 
 #include "align/private.h"
 #include "base/files.h"
-#include "linalg/petsc.h"
 #include "shapes.h"
+#include "tests/petsc_session.h"
 
 enum { SHAPES = 3, FUNCTIONS = 40 };
 
@@ -213,22 +213,11 @@ static void letter_is_itself_and_bends(void **state) {
   unload(&d);
 }
 
-static int start(void **state) {
-  (void)state;
-  return ep_petsc_start(NULL) != EP_OK;
-}
-
-static int stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(car_maps_itself),
       cmocka_unit_test(gorillas_swapped_regions_are_named),
       cmocka_unit_test(letter_is_itself_and_bends),
   };
-  return cmocka_run_group_tests_name("align/data", tests, start, stop);
+  return cmocka_run_group_tests_name("align/data", tests, session_start, session_stop);
 }

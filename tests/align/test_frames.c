@@ -15,8 +15,8 @@
 
 #include "align/private.h"
 #include "base/random.h"
-#include "linalg/petsc.h"
 #include "pairs.h"
+#include "tests/petsc_session.h"
 
 // EP_TURNS in the environment: how many (the claim was measured with 20; the default keeps CI
 // short)
@@ -108,22 +108,11 @@ static void bars(void **state) {
   check("bar, twisted", BODY_BAR, 2, place_bar, place_bar_twisted, marks);
 }
 
-static int start(void **state) {
-  (void)state;
-  return ep_petsc_start(NULL) != EP_OK;
-}
-
-static int stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(beasts),
       cmocka_unit_test(flyers),
       cmocka_unit_test(bars),
   };
-  return cmocka_run_group_tests_name("align/frames", tests, start, stop);
+  return cmocka_run_group_tests_name("align/frames", tests, session_start, session_stop);
 }

@@ -15,8 +15,8 @@
 
 #include "align/private.h"
 #include "base/random.h"
-#include "linalg/petsc.h"
 #include "shapes.h"
+#include "tests/petsc_session.h"
 
 enum { M = 10, FUNCTIONS = 20 };
 
@@ -519,17 +519,6 @@ static void wrong_frames_are_not_silent(void **state) {
   free_club(&from);
 }
 
-static int start(void **state) {
-  (void)state;
-  return ep_petsc_start(NULL) != EP_OK;
-}
-
-static int stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(permutation_comes_back),
@@ -544,5 +533,5 @@ int main(void) {
       cmocka_unit_test(reflections_are_found_on_request),
       cmocka_unit_test(wrong_frames_are_not_silent),
   };
-  return cmocka_run_group_tests_name("align/map", tests, start, stop);
+  return cmocka_run_group_tests_name("align/map", tests, session_start, session_stop);
 }

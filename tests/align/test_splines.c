@@ -13,8 +13,8 @@
 #include <cmocka.h>
 
 #include "align/private.h"
-#include "linalg/petsc.h"
 #include "shapes.h"
+#include "tests/petsc_session.h"
 
 enum { MARKS = 5, FUNCTIONS = 20, CELLS_X = 16, CELLS_Y = 4, CELLS_Z = 3 };
 
@@ -96,22 +96,11 @@ static void few_landmarks_make_bumps(void **state) {
   shape_free(&s);
 }
 
-static int start(void **state) {
-  (void)state;
-  return ep_petsc_start(NULL) != EP_OK;
-}
-
-static int stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(splines_are_one_at_home_and_zero_elsewhere),
       cmocka_unit_test(warps_follow_the_partners),
       cmocka_unit_test(few_landmarks_make_bumps),
   };
-  return cmocka_run_group_tests_name("align/splines", tests, start, stop);
+  return cmocka_run_group_tests_name("align/splines", tests, session_start, session_stop);
 }

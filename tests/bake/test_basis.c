@@ -5,9 +5,9 @@
 //   all elements with their volumes as weights give U^T f(U q) exactly;  c(q) = Phi^T M (X + U q).
 #include "bar.h"
 
-#include "linalg/petsc.h"
 #include "reduced/bake/basis.h"
 #include "reduced/bake/model_build.h"
+#include "tests/petsc_session.h"
 
 static const ep_elastic RUBBER = {.density = 1100, .young = 2e5, .poisson = 0.35};
 static const int CELLS[3] = {10, 2, 2};
@@ -394,17 +394,6 @@ static void test_example_elements(void **state) {
   close_model(&x);
 }
 
-static int start(void **state) {
-  (void)state;
-  return ep_petsc_start(NULL) != EP_OK;
-}
-
-static int stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_orthonormal),  cmocka_unit_test(test_examples_exact),
@@ -413,5 +402,5 @@ int main(void) {
       cmocka_unit_test(test_refusals),     cmocka_unit_test(test_all_elements),
       cmocka_unit_test(test_descriptors),  cmocka_unit_test(test_example_elements),
   };
-  return cmocka_run_group_tests(tests, start, stop);
+  return cmocka_run_group_tests(tests, session_start, session_stop);
 }

@@ -14,24 +14,13 @@
 #include "reduced/frame.h"
 
 #include "free_body.h"
+#include "tests/petsc_session.h"
 
 static const ep_elastic SOFT = {.density = 1000, .young = 2e5, .poisson = 0.3};
 static const ep_elastic STIFF = {.density = 1000, .young = 1e11, .poisson = 0.3};
 static const int CELLS[3] = {6, 2, 2};
 static const double SIZE[3] = {1, 0.3, 0.2};
 static const double PI = 3.14159265358979323846;
-
-static int start(void **state) {
-  (void)state;
-  ASSERT_OK(ep_petsc_start(err));
-  return 0;
-}
-
-static int stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
-}
 
 static double norm3(const double a[3]) {
   return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
@@ -457,5 +446,5 @@ int main(void) {
       cmocka_unit_test(gravity_and_pushes_give_their_impulse),
       cmocka_unit_test(a_failed_step_changes_nothing),
   };
-  return cmocka_run_group_tests(tests, start, stop);
+  return cmocka_run_group_tests(tests, session_start, session_stop);
 }

@@ -14,21 +14,10 @@
 
 #include "linalg/dense.h"
 #include "reduced/bake/contact_tree.h"
+#include "tests/petsc_session.h"
 
 static const ep_elastic SOFT = {.density = 1000, .young = 1e5, .poisson = 0.3};
 static const ep_elastic STIFF = {.density = 1000, .young = 1e10, .poisson = 0.3};
-
-static int start(void **state) {
-  (void)state;
-  ASSERT_OK(ep_petsc_start(err));
-  return 0;
-}
-
-static int stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
-}
 
 static void reset(free_body *f, const double velocity[3], const double spin[3]) {
   assert_int_equal(ep_state_init(f->model, f->block, ep_state_bytes(f->model), &f->state), EP_OK);
@@ -365,5 +354,5 @@ int main(void) {
       cmocka_unit_test(what_does_not_act_changes_nothing),
       cmocka_unit_test(errors_fall_with_the_integrators_order),
   };
-  return cmocka_run_group_tests(tests, start, stop);
+  return cmocka_run_group_tests(tests, session_start, session_stop);
 }

@@ -12,25 +12,13 @@
 
 #include "bar.h"
 
-#include "linalg/petsc.h"
 #include "reduced/bake/model_build.h"
+#include "tests/petsc_session.h"
 
 static const ep_elastic SOFT = {.density = 1000, .young = 2e5, .poisson = 0.35};
 static const ep_elastic STIFF = {.density = 1000, .young = 1e7, .poisson = 0.3};
 static const ep_frame STILL = {{0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 static const double G = 9.81;
-
-static int start(void **state) {
-  (void)state;
-  ASSERT_OK(ep_petsc_start(err));
-  return 0;
-}
-
-static int stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
-}
 
 // A plane through `point`, normal turned from z towards x by `angle`.
 static ep_obstacle plane_at(double x, double z, double angle, double friction) {
@@ -413,5 +401,5 @@ int main(void) {
       cmocka_unit_test(nothing_tunnels),
       cmocka_unit_test(force_is_what_momentum_changes_by),
   };
-  return cmocka_run_group_tests(tests, start, stop);
+  return cmocka_run_group_tests(tests, session_start, session_stop);
 }

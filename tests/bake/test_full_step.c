@@ -11,24 +11,12 @@
 
 #include "bar.h"
 
-#include "linalg/petsc.h"
 #include "reduced/bake/model_build.h"
+#include "tests/petsc_session.h"
 
 static const ep_elastic SOFT = {.density = 1000, .young = 2e5, .poisson = 0.35};
 static const int CELLS[3] = {2, 1, 1};
 static const double SIZE[3] = {1, 0.5, 0.4};
-
-static int start(void **state) {
-  (void)state;
-  ASSERT_OK(ep_petsc_start(err));
-  return 0;
-}
-
-static int stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
-}
 
 // ---- a complete basis --------------------------------------------------------------------------
 
@@ -477,5 +465,5 @@ int main(void) {
       cmocka_unit_test(free_body_keeps_momentum),
       cmocka_unit_test(failure_changes_nothing),
   };
-  return cmocka_run_group_tests(tests, start, stop);
+  return cmocka_run_group_tests(tests, session_start, session_stop);
 }

@@ -7,9 +7,9 @@
 #include "tests/bake/bar.h"
 
 #include "linalg/dense.h"
-#include "linalg/petsc.h"
 #include "reduced/bake/green_coefficients.h"
 #include "reduced/bake/green_full.h"
+#include "tests/petsc_session.h"
 
 enum { K = 3, R = 12, MANY = 32 };
 
@@ -422,17 +422,6 @@ static void coefficients_equal_full_space(void **state) {
   drop(&s);
 }
 
-static int start(void **state) {
-  (void)state;
-  ep_error err = {0};
-  return ep_petsc_start(&err) == EP_OK ? 0 : -1;
-}
-static int stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(weights_equal_a_dense_solve),
@@ -446,5 +435,5 @@ int main(void) {
       cmocka_unit_test(equilibrium_is_softer_along_examples),
       cmocka_unit_test(coefficients_equal_full_space),
   };
-  return cmocka_run_group_tests(tests, start, stop);
+  return cmocka_run_group_tests(tests, session_start, session_stop);
 }

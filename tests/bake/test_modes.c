@@ -6,9 +6,9 @@
 //   (Barbic and James 2005, eq. 15-18).
 #include "bar.h"
 
-#include "linalg/petsc.h"
 #include "reduced/bake/basis.h"
 #include "reduced/bake/curvature.h"
+#include "tests/petsc_session.h"
 
 static const ep_elastic RUBBER = {.density = 1100, .young = 2e5, .poisson = 0.35};
 static const int CELLS[3] = {6, 2, 2};
@@ -217,22 +217,11 @@ static void test_refusals(void **state) {
   free_bar(&b);
 }
 
-static int start(void **state) {
-  (void)state;
-  return ep_petsc_start(NULL) != EP_OK;
-}
-
-static int stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_eigenpairs), cmocka_unit_test(test_euler_bernoulli),
       cmocka_unit_test(test_curvature),  cmocka_unit_test(test_modal_derivatives),
       cmocka_unit_test(test_refusals),
   };
-  return cmocka_run_group_tests(tests, start, stop);
+  return cmocka_run_group_tests(tests, session_start, session_stop);
 }

@@ -8,6 +8,7 @@
 
 #include "reduced/bake/basis.h"
 #include "reduced/bake/paths.h"
+#include "tests/petsc_session.h"
 
 static const ep_elastic RUBBER = {.density = 1100, .young = 2e5, .poisson = 0};
 static const int CELLS[3] = {24, 3, 3};
@@ -154,17 +155,6 @@ static void test_half_of_a_bend(void **state) {
   free_bar(&b);
 }
 
-static int start(void **state) {
-  (void)state;
-  return ep_petsc_start(NULL) != EP_OK;
-}
-
-static int stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_derivatives),
@@ -172,5 +162,5 @@ int main(void) {
       cmocka_unit_test(test_samples_are_minima),
       cmocka_unit_test(test_half_of_a_bend),
   };
-  return cmocka_run_group_tests(tests, start, stop);
+  return cmocka_run_group_tests(tests, session_start, session_stop);
 }

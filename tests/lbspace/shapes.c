@@ -11,7 +11,6 @@
 
 #include "base/files.h"
 #include "base/random.h"
-#include "linalg/petsc.h"
 #include "mesh/io.h"
 #include "tests/linalg/grid.h"
 
@@ -61,18 +60,4 @@ int shape_from_data(const char *file, ep_mesh *out) {
   ep_error err = {0};
   if (ep_mesh_read(path, out, NULL, NULL, &err) != EP_OK) fail_msg("%s", err.text);
   return 1;
-}
-
-int session_start(void **state) {
-  (void)state;
-  ep_error err = {0};
-  if (ep_petsc_start(&err) == EP_OK) return 0;
-  print_message("%s\n", err.text);
-  return -1;
-}
-
-int session_stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
 }

@@ -1,4 +1,4 @@
-// Meshes and the solver session for the tests of lbspace/.
+// Meshes for the tests of lbspace/.
 #ifndef EP_TESTS_LBSPACE_SHAPES_H
 #define EP_TESTS_LBSPACE_SHAPES_H
 
@@ -11,8 +11,5 @@ ep_mesh shape_box(int nx, int ny, int nz, double lx, double ly, double lz);
 ep_mesh shape_permuted(const ep_mesh *mesh, int *to);
 // A file of the shared data folder, 0 where the folder is absent (then the caller skips).
 int shape_from_data(const char *file, ep_mesh *out);
-
-int session_start(void **state);
-int session_stop(void **state);
 
 #endif

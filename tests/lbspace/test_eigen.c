@@ -15,8 +15,8 @@
 #include <cmocka.h>
 
 #include "base/files.h"
-#include "linalg/petsc.h"
 #include "tests/lbspace/shapes.h"
+#include "tests/petsc_session.h"
 
 static const double pi = 3.14159265358979323846;
 

@@ -15,6 +15,7 @@
 
 #include "linalg/dense.h"
 #include "tests/lbspace/shapes.h"
+#include "tests/petsc_session.h"
 
 enum { FUNCTIONS = 20 };
 

@@ -13,6 +13,7 @@
 #include <cmocka.h>
 
 #include "tests/lbspace/shapes.h"
+#include "tests/petsc_session.h"
 
 enum { M = 8, NX = 12, NY = 4 };
 

@@ -11,22 +11,8 @@
 
 #include <cmocka.h>
 
-#include "linalg/petsc.h"
 #include "tests/linalg/grid.h"
-
-static int session_start(void **state) {
-  (void)state;
-  ep_error err = {0};
-  if (ep_petsc_start(&err) == EP_OK) return 0;
-  print_message("%s\n", err.text);
-  return -1;
-}
-
-static int session_stop(void **state) {
-  (void)state;
-  ep_petsc_stop();
-  return 0;
-}
+#include "tests/petsc_session.h"
 
 // Graph Laplacian of the grid plus `diagonal`: eigenvalues >= diagonal.
 static ep_csr laplacian(const grid *g, int block, double diagonal) {
