@@ -156,16 +156,14 @@ ep_status ep_cubic_pack_float(int r, const double *packed, float *stream) {
 
 // ---- evaluation ------------------------------------------------------------------------------
 
-static void choose(ep_cubic *cubic) {
-  const int wide = cubic->precision == EP_DOUBLE;
-  cubic->isa = "baseline", cubic->kernel = wide ? ep_cubic_f64_baseline : ep_cubic_f32_baseline;
+ep_cubic_kernel ep_cubic_kernel_of(ep_isa isa, ep_precision precision) {
+  const int wide = precision == EP_DOUBLE;
 #if defined(__x86_64__)
-  __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx2"))
-    cubic->isa = "avx2", cubic->kernel = wide ? ep_cubic_f64_avx2 : ep_cubic_f32_avx2;
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
-    cubic->isa = "avx512", cubic->kernel = wide ? ep_cubic_f64_avx512 : ep_cubic_f32_avx512;
+  if (isa == EP_ISA_AVX512) return wide ? ep_cubic_f64_avx512 : ep_cubic_f32_avx512;
+  if (isa == EP_ISA_AVX2) return wide ? ep_cubic_f64_avx2 : ep_cubic_f32_avx2;
 #endif
+  (void)isa;
+  return wide ? ep_cubic_f64_baseline : ep_cubic_f32_baseline;
 }
 
 ep_status ep_cubic_open(int r, ep_precision precision, const void *stream, ep_cubic *out) {
@@ -173,8 +171,12 @@ ep_status ep_cubic_open(int r, ep_precision precision, const void *stream, ep_cu
   if (r < 1 || r > EP_CUBIC_MAX_MODES || (precision != EP_DOUBLE && precision != EP_FLOAT) ||
       !stream || (uintptr_t)stream % ALIGNMENT)
     return EP_ERR_ARGUMENT;
-  *out = (ep_cubic){.r = r, .precision = precision, .stream = stream};
-  choose(out);
+  const ep_isa isa = ep_isa_here();
+  *out = (ep_cubic){.r = r,
+                    .precision = precision,
+                    .stream = stream,
+                    .isa = ep_isa_name(isa),
+                    .kernel = ep_cubic_kernel_of(isa, precision)};
   return EP_OK;
 }
 

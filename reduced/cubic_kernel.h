@@ -4,6 +4,7 @@
 #define EP_REDUCED_CUBIC_KERNEL_H
 
 #include "reduced/cubic.h"
+#include "reduced/isa.h"
 
 enum {
   // From this many entries of z on, blocks of the quartic form; below, the plain square matrix over
@@ -22,6 +23,8 @@ struct ep_cubic_task {
   void *scratch;
 };
 
+typedef void (*ep_cubic_kernel)(const ep_cubic_task *task);
+
 void ep_cubic_f64_baseline(const ep_cubic_task *task);
 void ep_cubic_f32_baseline(const ep_cubic_task *task);
 #if defined(__x86_64__)
@@ -30,6 +33,9 @@ void ep_cubic_f32_avx2(const ep_cubic_task *task);
 void ep_cubic_f64_avx512(const ep_cubic_task *task);
 void ep_cubic_f32_avx512(const ep_cubic_task *task);
 #endif
+
+// The kernel of an instruction set this processor runs.
+ep_cubic_kernel ep_cubic_kernel_of(ep_isa isa, ep_precision precision);
 
 static inline int ep_cubic_lanes(ep_precision precision) {
   return precision == EP_DOUBLE ? 8 : 16;

@@ -14,13 +14,12 @@
 #include "reduced/green_weights.h"
 #include "reduced/state.h"
 
-ep_green_kernel ep_green_select(void) {
+ep_green_kernel ep_green_of(ep_isa isa) {
 #if defined(__x86_64__)
-  __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
-    return ep_green_avx512();
-  if (__builtin_cpu_supports("avx2")) return ep_green_avx2();
+  if (isa == EP_ISA_AVX512) return ep_green_avx512();
+  if (isa == EP_ISA_AVX2) return ep_green_avx2();
 #endif
+  (void)isa;
   return ep_green_baseline();
 }
 
@@ -52,7 +51,8 @@ static double solve_weights(ep_state *state, const ep_green *green) {
 // low := scale L^-1 J with C = L L^T (the identity without constraints).
 static void lower_jacobian(ep_state *state, const ep_green *green, double scale) {
   const int p = state->model->size.greens, width = 8 * state->model->size.blocks;
-  const double *l = green->sum_to_one > 0 || green->non_negative > 0 ? state->green_c : NULL;
+  const ep_green_problem problem = problem_of(state->model, green);
+  const double *l = ep_green_constrained(&problem) ? state->green_c : NULL;
   for (int i = 0; i < p; i++) {
     double *row = state->green_low + (size_t)i * (size_t)width;
     const double *from = state->green_jacobian + (size_t)i * (size_t)width;

@@ -1,7 +1,9 @@
 // Private part of the Green-strain path: products with the coefficients, compiled per instruction
-// set like the cubature kernels (green_body.h), and the weights under weak constraints.
+// set like the cubature kernels (green_body.h). The weights: green_weights.h; the potential: state.h.
 #ifndef EP_REDUCED_GREEN_H
 #define EP_REDUCED_GREEN_H
+
+#include "reduced/isa.h"
 
 // One evaluation of count quadratic forms y_i = linear_i . z + 1/2 z^T B_i z over width = 8 blocks
 // lanes. B_i: tiles (a, b), b <= a, of 8 rows a and 8 lanes b, in the order of a; tiles on the
@@ -30,7 +32,7 @@ ep_green_kernel ep_green_baseline(void);
 ep_green_kernel ep_green_avx2(void);
 ep_green_kernel ep_green_avx512(void);
 #endif
-// The widest level this processor runs.
-ep_green_kernel ep_green_select(void);
+// The kernels of an instruction set this processor runs.
+ep_green_kernel ep_green_of(ep_isa isa);
 
 #endif

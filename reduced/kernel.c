@@ -1,22 +1,11 @@
 #include "reduced/kernel.h"
 
-#include <stddef.h>
-
-ep_kernel ep_kernel_select(const char **name) {
-  const char *unused;
-  if (!name) name = &unused;
+ep_kernel ep_kernel_of(ep_isa isa) {
 #if defined(__x86_64__)
-  __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")) {
-    *name = "avx512";
-    return ep_kernel_avx512;
-  }
-  if (__builtin_cpu_supports("avx2")) {
-    *name = "avx2";
-    return ep_kernel_avx2;
-  }
+  if (isa == EP_ISA_AVX512) return ep_kernel_avx512;
+  if (isa == EP_ISA_AVX2) return ep_kernel_avx2;
 #endif
-  *name = "baseline";
+  (void)isa;
   return ep_kernel_baseline;
 }
 

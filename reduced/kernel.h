@@ -4,6 +4,7 @@
 #ifndef EP_REDUCED_KERNEL_H
 #define EP_REDUCED_KERNEL_H
 
+#include "reduced/isa.h"
 #include "reduced/material.h"
 
 enum { EP_LANES = 8 };
@@ -46,7 +47,7 @@ void ep_kernel_avx2(ep_kernel_task *task);
 void ep_kernel_avx512(ep_kernel_task *task);
 #endif
 
-// The widest level this processor runs; name (may be NULL) receives "baseline", "avx2", "avx512".
-ep_kernel ep_kernel_select(const char **name);
+// The kernel of an instruction set this processor runs.
+ep_kernel ep_kernel_of(ep_isa isa);
 
 #endif

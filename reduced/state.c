@@ -66,11 +66,13 @@ ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_st
   if (!memory || (uintptr_t)memory % ALIGNMENT || bytes < ep_state_bytes(model))
     return EP_ERR_ARGUMENT;
   memset(memory, 0, ep_state_bytes(model));
+  const ep_isa isa = ep_isa_here();
   ep_state *state = memory;
   lay_out(model, memory, state);
   state->model = model;
-  state->kernel = ep_kernel_select(&state->isa);
-  state->green_kernel = ep_green_select();
+  state->isa = ep_isa_name(isa);
+  state->kernel = ep_kernel_of(isa);
+  state->green_kernel = ep_green_of(isa);
   for (int g = 0; g < ep_model_regions(model); g++) state->w[g] = 1;
   ep_state_rest_frame(state);
   state->energy_noise = 1e-13;

@@ -19,22 +19,6 @@
 
 enum { R = 30, STEPS = 1000 };
 
-typedef struct level {
-  ep_kernel kernel;
-  void (*cubic)(const ep_cubic_task *);
-} level;
-
-static int levels(level out[3]) {
-  int count = 0;
-  out[count++] = (level){ep_kernel_baseline, ep_cubic_f64_baseline};
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) out[count++] = (level){ep_kernel_avx2, ep_cubic_f64_avx2};
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
-    out[count++] = (level){ep_kernel_avx512, ep_cubic_f64_avx512};
-#endif
-  return count;
-}
-
 // FNV-1a over the bytes.
 static void add(uint64_t *hash, const double *x, size_t count) {
   const unsigned char *bytes = (const unsigned char *)x;
@@ -42,14 +26,14 @@ static void add(uint64_t *hash, const double *x, size_t count) {
 }
 
 // Positions and velocities of all steps under a load that comes and goes.
-static uint64_t run(const ep_model *model, const double *load, const level *at) {
+static uint64_t run(const ep_model *model, const double *load, ep_isa isa) {
   const size_t bytes = ep_state_bytes(model);
   void *block = aligned_alloc(64, bytes);
   ep_state *s = NULL;
   assert_non_null(block);
   assert_int_equal(ep_state_init(model, block, bytes, &s), EP_OK);
-  s->kernel = at->kernel;
-  if (!ep_is_cubature(model->evaluator)) s->cubic.kernel = at->cubic;
+  s->kernel = ep_kernel_of(isa);
+  if (!ep_is_cubature(model->evaluator)) s->cubic.kernel = ep_cubic_kernel_of(isa, EP_DOUBLE);
   ep_step_def def = ep_default_step();
   def.damping_stiffness = 0.002;
   uint64_t hash = 0xcbf29ce484222325;
@@ -63,10 +47,9 @@ static uint64_t run(const ep_model *model, const double *load, const level *at) 
 }
 
 static void all_levels(const char *name, const ep_model *model, const double *load) {
-  level list[3];
-  const int count = levels(list);
-  const uint64_t first = run(model, load, &list[0]);
-  for (int i = 1; i < count; i++) assert_true(run(model, load, &list[i]) == first);
+  const int count = ep_isa_here() + 1;
+  const uint64_t first = run(model, load, EP_ISA_BASELINE);
+  for (int i = 1; i < count; i++) assert_true(run(model, load, (ep_isa)i) == first);
   print_message("%s: %016" PRIx64 " on %d levels\n", name, first, count);
 }
 
