@@ -95,7 +95,8 @@ static ep_status read_sizes(const ep_tensorfile *file, ep_model_sizes *z, char *
     return ep_text_refuse(message, "impossible sizes: k examples need descriptors, 1 <= m <= n, or "
                                    "the coefficients of their strains");
   if (z->rigid > 1) return ep_text_refuse(message, "rigid is neither 0 nor 1");
-  if ((z->contacts > 0) != (z->nodes > 0) || z->contacts > z->n || z->nodes > 2 * z->contacts)
+  if ((z->contacts > 0) != (z->nodes > 0) || z->contacts > z->n ||
+      z->nodes - z->contacts > z->contacts)
     return ep_text_refuse(message, "impossible sizes: contacts and nodes of their tree");
   if (z->regions > z->k || (z->regions > 0 && z->m < z->regions))
     return ep_text_refuse(message, "regions must have examples and functions of their own");
@@ -151,8 +152,9 @@ static ep_status check_finite_floats(const char *name, const float *x, size_t co
   return EP_OK;
 }
 
-static ep_status check_at_least_zero(const char *name, const double *x, int count, char *message) {
-  for (int i = 0; i < count; i++)
+static ep_status check_at_least_zero(const char *name, const double *x, int64_t count,
+                                     char *message) {
+  for (int64_t i = 0; i < count; i++)
     if (!(x[i] >= 0)) return refuse_array(message, name, "holds a negative number");
   return EP_OK;
 }
@@ -173,12 +175,13 @@ static ep_status check_index(const char *name, const int32_t *x, int64_t count, 
 
 // Every region has functions and examples.
 static ep_status check_regions(const ep_model *model, char *message) {
-  const int regions = model->size.regions, k = model->size.k, s = model->size.s;
+  const int regions = model->size.regions, k = model->size.k;
   if (!regions) return EP_OK;
+  const int64_t parts = (int64_t)regions * model->size.s;
   const int32_t *first = model->region_first;
   FIRST_FAILURE(check_index("example_region", model->example_region, k, regions, message));
-  FIRST_FAILURE(check_at_least_zero("region_inside", model->region_inside, regions * s, message));
-  FIRST_FAILURE(check_at_least_zero("region_outside", model->region_outside, regions * s, message));
+  FIRST_FAILURE(check_at_least_zero("region_inside", model->region_inside, parts, message));
+  FIRST_FAILURE(check_at_least_zero("region_outside", model->region_outside, parts, message));
   for (int g = 0; g < regions; g++) {
     int examples = 0;
     for (int i = 0; i < k; i++) examples += model->example_region[i] == g;
@@ -231,7 +234,7 @@ static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *m
   if (rigid && !(model->rigid_mass[0] > 0))
     return refuse_array(message, "rigid_mass", "not positive");
   FIRST_FAILURE(check_regions(model, message));
-  return check_at_least_zero("example_w", model->example_w, m ? k * s : 0, message);
+  return check_at_least_zero("example_w", model->example_w, m ? (int64_t)k * s : 0, message);
 }
 
 static ep_status read_scale(const ep_tensorfile *file, double *scale, char *message) {

@@ -97,4 +97,12 @@
   X(double, contact_scale, contacts ? 1 : 0, 1, 1)
 // clang-format on
 
+// Their number: arrays[EP_MODEL_ARRAY_COUNT] holds something of each.
+enum {
+#define X(type, name, d1, d2, d3) EP_MODEL_ARRAY_##name,
+  EP_MODEL_ARRAYS(X)
+#undef X
+      EP_MODEL_ARRAY_COUNT
+};
+
 #endif

@@ -144,6 +144,16 @@ void ep_fem_free(ep_fem *fem) {
   *fem = (ep_fem){0};
 }
 
+double ep_fem_contact_unit(const ep_fem *fem) {
+  double volume = 0, sum = 0;
+  for (int e = 0; e < fem->mesh->nt; e++) {
+    const double lambda = fem->lambda[e], mu = fem->mu[e];
+    volume += fem->volume[e];
+    sum += fem->volume[e] * mu * (3 * lambda + 2 * mu) / (lambda + mu);
+  }
+  return sum / volume / ep_mesh_diagonal(fem->mesh);
+}
+
 double ep_fem_energy(const ep_fem *fem, const double *u) {
   double sum = 0;
   for (int e = 0; e < fem->mesh->nt; e++) {

@@ -6,23 +6,13 @@
 
 #include "reduced/bake/contact_tree.h"
 
-static double mean_young(const ep_fem *fem) {
-  double volume = 0, sum = 0;
-  for (int e = 0; e < fem->mesh->nt; e++) {
-    const double lambda = fem->lambda[e], mu = fem->mu[e];
-    volume += fem->volume[e];
-    sum += fem->volume[e] * mu * (3 * lambda + 2 * mu) / (lambda + mu);
-  }
-  return sum / volume;
-}
-
 ep_status ep_full_contact_create(const ep_fem *fem, ep_full_contact **out, ep_error *err) {
   const size_t n = (size_t)fem->mesh->nv;
   ep_full_contact *c = *out = calloc(1, sizeof *c);
   if (!c) return ep_fail(err, EP_ERR_MEMORY, "no memory for contact in the full space");
   c->mesh = fem->mesh;
   c->diagonal = ep_mesh_diagonal(fem->mesh);
-  c->unit = mean_young(fem) / c->diagonal;
+  c->unit = ep_fem_contact_unit(fem);
   c->vertex = malloc(n * sizeof *c->vertex);
   c->area = malloc(n * sizeof *c->area);
   c->start = calloc(9 * n, sizeof *c->start);

@@ -288,17 +288,6 @@ static ep_status fill_cubic(builder *b, ep_error *err) {
   return EP_OK;
 }
 
-// Young's modulus, by volume, over the diagonal: the unit of the contact's stiffness.
-static double contact_scale(const ep_fem *fem) {
-  double volume = 0, sum = 0;
-  for (int e = 0; e < fem->mesh->nt; e++) {
-    const double lambda = fem->lambda[e], mu = fem->mu[e];
-    volume += fem->volume[e];
-    sum += fem->volume[e] * mu * (3 * lambda + 2 * mu) / (lambda + mu);
-  }
-  return sum / volume / ep_mesh_diagonal(fem->mesh);
-}
-
 static void fill_contact(builder *b) {
   const ep_contact_tree *t = b->parts->contact;
   if (!t) return;
@@ -312,7 +301,7 @@ static void fill_contact(builder *b) {
   memcpy(b->a.tree_u, t->node_u, 3 * nodes * r * sizeof(double));
   memcpy(b->a.tree_radius, t->radius, nodes * sizeof(double));
   memcpy(b->a.tree_growth, t->growth, nodes * r * sizeof(double));
-  b->a.contact_scale[0] = contact_scale(b->parts->fem);
+  b->a.contact_scale[0] = ep_fem_contact_unit(b->parts->fem);
 }
 
 static ep_status fill_inertia(builder *b, ep_error *err) {

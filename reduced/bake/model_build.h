@@ -34,7 +34,7 @@ typedef struct ep_model_parts {
 // A model with memory of its own; nothing of the parts is kept.
 typedef struct ep_model_memory {
   ep_model model;
-  void *owned[64]; // one block per array
+  void *owned[EP_MODEL_ARRAY_COUNT]; // (count) one block per array that is there
   int count;
 } ep_model_memory;
 
@@ -44,8 +44,9 @@ typedef struct ep_model_memory {
 // it a mean displacement would not be seen. With regions: T = L^T M_R U of each, one after another
 // (Zhao et al. 2018, sec. 5), with the constant function where the region is held
 // (ep_region_carried). Example i: q_i of the basis, c0 + T q_i, and at each cubature element F_i^-1
-// and w |det F_i|. Errors: EP_ERR_ARGUMENT (sizes, element numbers, weights), EP_ERR_NUMERIC where
-// an example flattens a cubature element (names both), EP_ERR_MEMORY.
+// and w |det F_i| (reduced/reference.h: nothing where the example flattens it). Errors:
+// EP_ERR_ARGUMENT (sizes, element numbers, weights), EP_ERR_NUMERIC (numbers that do not fit the
+// precision), EP_ERR_MEMORY.
 ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_error *err);
 void ep_model_memory_free(ep_model_memory *memory);
 

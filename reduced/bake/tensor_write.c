@@ -213,18 +213,12 @@ enum {
 #undef ONE
       SIZE_COUNT
 };
-enum {
-#define ONE(type, name, d1, d2, d3) ARRAY_##name,
-  EP_MODEL_ARRAYS(ONE)
-#undef ONE
-      ARRAY_COUNT
-};
 
 ep_status ep_model_write(const char *path, const ep_model *model, int nmeta,
                          const ep_metadata *meta, ep_error *err) {
   char size_text[SIZE_COUNT][16];
   ep_metadata all[MAX_MODEL_META];
-  ep_tensor tensors[ARRAY_COUNT + 1];
+  ep_tensor tensors[EP_MODEL_ARRAY_COUNT + 1];
   int used = 0, at = 0;
   EP_TRY(check_model(path, model, err));
   all[used++] = (ep_metadata){"format", "eigenpose-model"};
