@@ -41,7 +41,8 @@ enum {
   KEY_LARGEST = 'l',
   KEY_SERVED = 0x100,
   KEY_QUICK,
-  KEY_REPLAY
+  KEY_REPLAY,
+  KEY_KERNELS
 };
 
 #define OPTION_JSON                                                                                \
@@ -100,6 +101,17 @@ static const struct argp_option check_options[] = {
     {0}};
 static const struct argp_option run_options[] = {
     {"out", KEY_OUT, "DIR", 0, "Folder of the results (default: out/NAME)", 0},
+    {"kernels", KEY_KERNELS, "LEVEL", 0,
+     "Instruction set of the steps: baseline, avx2 or avx512 (default: the widest this processor "
+     "runs); the trajectory is the same to the bit",
+     0},
+    OPTION_JSON,
+    OPTION_QUIET,
+    OPTION_SET,
+    OPTION_CACHE,
+    {0}};
+static const struct argp_option compare_options[] = {
+    {"out", KEY_OUT, "DIR", 0, "Folder of the results (default: out/NAME)", 0},
     OPTION_JSON,
     OPTION_QUIET,
     OPTION_SET,
@@ -139,7 +151,7 @@ static const struct {
                             "and report error against run time: a page, its chart, tables. "
                             "Finished points are kept in the cache: an interrupted sweep goes on "
                             "where it stopped.",
-                            run_options},
+                            compare_options},
     [EP_COMMAND_STRESS] = {"stress", "SCENE",
                            "Push a scene far beyond what it was made for - stiffness, time step, "
                            "loads, start states, materials - and report what stays sound. A "
@@ -203,6 +215,9 @@ static error_t take(int key, char *arg, struct argp_state *state) {
     return 0;
   case KEY_QUICK:
     cli->quick = true;
+    return 0;
+  case KEY_KERNELS:
+    cli->kernels = arg;
     return 0;
   case KEY_REPLAY:
     cli->replay = arg;

@@ -31,6 +31,7 @@ typedef struct ep_cli {
   const char *repair; // check: where the repaired mesh goes
   bool largest;       // check: of it keep the largest part only
   const char *out, *cache;
+  const char *kernels; // run: instruction set of the kernels; NULL: the widest
   int count; // eigen: eigenpairs wanted
   bool json, quiet;
   bool quick;         // stress: only the ends of every axis

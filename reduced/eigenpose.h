@@ -89,6 +89,10 @@ ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_st
 const ep_model *ep_state_model(const ep_state *state);
 const double *ep_state_k0_factor(const ep_state *state); // L (r x r, lower), K0 = L L^T
 const char *ep_state_isa(const ep_state *state); // kernels in use: "baseline", "avx2", "avx512"
+// Use these kernels instead of the widest the processor runs; all give the same bits. Errors:
+// EP_ERR_UNSUPPORTED (not on this processor), EP_ERR_ARGUMENT (no such name): nothing is changed.
+ep_status ep_state_use_isa(ep_state *state, const char *name);
+ep_status ep_isa_check(const char *name); // would it take this name?
 double *ep_state_q(ep_state *state);             // (r) reduced coordinates, may be written
 double *ep_state_velocity(ep_state *state);      // (r) may be written
 const double *ep_state_weights(const ep_state *state); // (k) example weights of the last step

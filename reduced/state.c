@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "reduced/cubic_kernel.h"
+
 enum { ALIGNMENT = 64 };
 
 static size_t rounded(size_t bytes) {
@@ -60,19 +62,43 @@ static void measure_scales(ep_state *state) {
   state->force_scale = m->cubic_scales[2];
 }
 
+// After the polynomials are open.
+static void use_isa(ep_state *state, ep_isa isa) {
+  state->isa = ep_isa_name(isa);
+  state->kernel = ep_kernel_of(isa);
+  state->green_kernel = ep_green_of(isa);
+  if (!state->cubic.stream) return;
+  state->cubic.isa = state->isa;
+  state->cubic.kernel = ep_cubic_kernel_of(isa, state->cubic.precision);
+}
+
+static int isa_named(const char *name) {
+  int isa = 0;
+  while (isa < EP_ISAS && strcmp(name, ep_isa_name((ep_isa)isa)) != 0) isa++;
+  return isa;
+}
+
+ep_status ep_isa_check(const char *name) {
+  const int isa = isa_named(name);
+  if (isa == EP_ISAS) return EP_ERR_ARGUMENT;
+  return isa <= (int)ep_isa_here() ? EP_OK : EP_ERR_UNSUPPORTED;
+}
+
+ep_status ep_state_use_isa(ep_state *state, const char *name) {
+  const ep_status status = ep_isa_check(name);
+  if (status == EP_OK) use_isa(state, (ep_isa)isa_named(name));
+  return status;
+}
+
 ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_state **out) {
   *out = NULL;
   if (ep_model_check_evaluator(model, NULL) != EP_OK) return EP_ERR_ARGUMENT;
   if (!memory || (uintptr_t)memory % ALIGNMENT || bytes < ep_state_bytes(model))
     return EP_ERR_ARGUMENT;
   memset(memory, 0, ep_state_bytes(model));
-  const ep_isa isa = ep_isa_here();
   ep_state *state = memory;
   lay_out(model, memory, state);
   state->model = model;
-  state->isa = ep_isa_name(isa);
-  state->kernel = ep_kernel_of(isa);
-  state->green_kernel = ep_green_of(isa);
   for (int g = 0; g < ep_model_regions(model); g++) state->w[g] = 1;
   ep_state_rest_frame(state);
   state->energy_noise = 1e-13;
@@ -82,6 +108,7 @@ ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_st
   if (!ep_is_cubature(model->evaluator) &&
       ep_cubic_open(model->size.r, precision_of(model), stream, &state->cubic) != EP_OK)
     return EP_ERR_ARGUMENT;
+  use_isa(state, ep_isa_here());
   measure_scales(state);
   if (!ep_cholesky(model->size.r, model->k0, state->k0_factor)) return EP_ERR_NUMERIC;
   *out = state;

@@ -27,10 +27,10 @@ static ep_status simulate(const ep_bench *bench, const ep_scene *scene, const ep
   ep_log quiet = *bench->log;
   quiet.quiet = true;
   const double started = ep_seconds();
-  EP_TRY(ep_simulate(scene, &bench->shapes, model, &quiet, out, err));
+  EP_TRY(ep_simulate(scene, &bench->shapes, model, NULL, &quiet, out, err));
   for (int i = 1; i < REPEATS && ep_seconds() - started < REPEAT_SECONDS; i++) {
     ep_record again;
-    const ep_status status = ep_simulate(scene, &bench->shapes, model, &quiet, &again, err);
+    const ep_status status = ep_simulate(scene, &bench->shapes, model, NULL, &quiet, &again, err);
     for (int j = 0; j < scene->steps && status == EP_OK; j++) {
       out->step_ms[j] = fmin(out->step_ms[j], again.step_ms[j]);
       out->target_ms[j] = fmin(out->target_ms[j], again.target_ms[j]);

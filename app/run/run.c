@@ -96,6 +96,15 @@ static double farthest_fraction(const ep_model *model, const ep_record *record) 
   return most; // fmax passes NaN over
 }
 
+// Of every recorded state: runs of one model agree in it exactly where their trajectories do.
+static ep_digest trajectory_digest(const ep_model *model, const ep_record *record) {
+  const size_t count = (size_t)record->rows * (size_t)model->size.r * sizeof(double);
+  const ep_digest part[3] = {
+      ep_hash_bytes(record->q, count), ep_hash_bytes(record->velocity, count),
+      ep_hash_bytes(record->frame, record->frame ? (size_t)record->rows * sizeof(ep_frame) : 0)};
+  return ep_hash_bytes(part, sizeof part);
+}
+
 static void add_timing(json_t *report, const ep_record *record) {
   const int steps = record->rows > 0 ? record->rows - 1 : 0;
   json_object_set_new(report, "steps_done", json_integer(steps));
@@ -152,6 +161,9 @@ static json_t *make_report(const ep_session *session, const ep_model_file *file,
                       json_pack("{s:o, s:o}", "train", ep_json_number(file->train_error),
                                 "held_out", ep_json_number(file->held_out_error)));
   if (record->contact) json_object_set_new(report, "contact", contact_of(model, record));
+  json_object_set_new(report, "kernels", json_string(record->isa));
+  const ep_digest digest = trajectory_digest(model, record);
+  json_object_set_new(report, "trajectory_hash", json_string(digest.hex));
   json_object_set_new(report, "inverted_tets", json_integer(record->max_inverted));
   double largest = NAN;
   if (last >= 0)
@@ -188,8 +200,8 @@ static ep_status simulate(const ep_cli *cli, ep_session *session, const ep_model
   else
     EP_TRY(ep_path_join("out", session->scene.name, folder, err));
   ep_record record;
-  const ep_status simulated =
-      ep_simulate(&session->scene, &session->shapes, &model->model, &session->log, &record, err);
+  const ep_status simulated = ep_simulate(&session->scene, &session->shapes, &model->model,
+                                          cli->kernels, &session->log, &record, err);
   if (simulated != EP_OK && record.rows < 2) {
     ep_record_free(&record);
     return simulated;
@@ -205,9 +217,21 @@ static ep_status simulate(const ep_cli *cli, ep_session *session, const ep_model
   return simulated != EP_OK ? simulated : status;
 }
 
+// Before anything is baked.
+static ep_status check_kernels(const char *name, ep_error *err) {
+  const ep_status status = name ? ep_isa_check(name) : EP_OK;
+  if (status == EP_OK) return EP_OK;
+  return ep_fail(err, status,
+                 status == EP_ERR_UNSUPPORTED
+                     ? "--kernels %s: this processor does not run them; leave the option out"
+                     : "--kernels %s: there are baseline, avx2 and avx512",
+                 name);
+}
+
 ep_status ep_command_run(const ep_cli *cli, ep_error *err) {
   ep_session session;
   ep_model_file model = {0};
+  EP_TRY(check_kernels(cli->kernels, err));
   EP_TRY(ep_session_open(cli, &session, err));
   ep_status status = get_model(cli, &session, &model, err);
   if (status == EP_OK) status = simulate(cli, &session, &model, err);

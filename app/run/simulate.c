@@ -130,12 +130,15 @@ static ep_status run_steps(simulation *s, const ep_mesh *mesh, ep_log *log, ep_e
 }
 
 ep_status ep_simulate(const ep_scene *scene, const ep_shapes *shapes, const ep_model *model,
-                      ep_log *log, ep_record *out, ep_error *err) {
+                      const char *kernels, ep_log *log, ep_record *out, ep_error *err) {
   simulation s = {.scene = scene, .model = model, .record = out};
   EP_TRY(make_record(scene, model, out, err));
   EP_TRY(ep_stepper_open(scene, shapes, model, &s.stepper, err));
   s.state = ep_stepper_state(s.stepper);
-  const ep_status status = run_steps(&s, &shapes->shape[0].mesh, log, err);
+  ep_status status = kernels ? ep_state_use_isa(s.state, kernels) : EP_OK;
+  if (status != EP_OK) ep_fail(err, status, "there are no kernels '%s' here", kernels);
+  out->isa = ep_state_isa(s.state);
+  if (status == EP_OK) status = run_steps(&s, &shapes->shape[0].mesh, log, err);
   ep_stepper_close(s.stepper);
   return status;
 }

@@ -11,6 +11,7 @@ enum { EP_CONTACT_TOUCHING, EP_CONTACT_DEEPEST, EP_CONTACT_FORCE, EP_CONTACT_COL
 
 typedef struct ep_record {
   int rows;              // steps done + 1 (row 0 is rest)
+  const char *isa;       // instruction set of the kernels
   double *time;          // (rows) [s]
   double *q;             // (rows x r)
   double *velocity;      // (rows x r)
@@ -30,10 +31,11 @@ typedef struct ep_record {
 } ep_record;
 
 // Simulate scene->steps steps. What was done before a failure stays in the record.
+// kernels: instruction set of the steps (reduced/eigenpose.h, ep_isa_check), NULL for the widest.
 // Errors: EP_ERR_NUMERIC where a step fails even after halving, with its number; those of
 // selections.
 ep_status ep_simulate(const ep_scene *scene, const ep_shapes *shapes, const ep_model *model,
-                      ep_log *log, ep_record *out, ep_error *err);
+                      const char *kernels, ep_log *log, ep_record *out, ep_error *err);
 void ep_record_free(ep_record *record);
 
 // Positions x (n x 3) of the model into the world, in place.

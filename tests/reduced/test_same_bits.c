@@ -12,7 +12,6 @@
 
 #include <cmocka.h>
 
-#include "reduced/cubic_kernel.h"
 #include "reduced/state.h"
 #include "tests/reduced/bar.h"
 #include "tests/reduced/quartic.h"
@@ -32,8 +31,8 @@ static uint64_t run(const ep_model *model, const double *load, ep_isa isa) {
   ep_state *s = NULL;
   assert_non_null(block);
   assert_int_equal(ep_state_init(model, block, bytes, &s), EP_OK);
-  s->kernel = ep_kernel_of(isa);
-  if (!ep_is_cubature(model->evaluator)) s->cubic.kernel = ep_cubic_kernel_of(isa, EP_DOUBLE);
+  assert_int_equal(ep_state_use_isa(s, ep_isa_name(isa)), EP_OK);
+  assert_string_equal(ep_state_isa(s), ep_isa_name(isa));
   ep_step_def def = ep_default_step();
   def.damping_stiffness = 0.002;
   uint64_t hash = 0xcbf29ce484222325;
@@ -87,10 +86,26 @@ static void polynomials(void **state) {
   bar_free(b);
 }
 
+// Only what there is: another name, or a level this processor does not run, changes nothing.
+static void other_levels_are_refused(void **state) {
+  (void)state;
+  bar *b = bar_create(2, 1, 1, 6, 6, 0, 0, EP_STVK);
+  void *block;
+  ep_state *s = bar_state(b, &block);
+  assert_string_equal(ep_state_isa(s), ep_isa_name(ep_isa_here()));
+  assert_int_equal(ep_state_use_isa(s, "sse9"), EP_ERR_ARGUMENT);
+  for (int isa = ep_isa_here() + 1; isa < EP_ISAS; isa++)
+    assert_int_equal(ep_state_use_isa(s, ep_isa_name((ep_isa)isa)), EP_ERR_UNSUPPORTED);
+  assert_string_equal(ep_state_isa(s), ep_isa_name(ep_isa_here()));
+  free(block);
+  bar_free(b);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(cubature_with_examples),
       cmocka_unit_test(polynomials),
+      cmocka_unit_test(other_levels_are_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
