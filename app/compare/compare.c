@@ -365,7 +365,7 @@ static ep_status output(sweep *w, ep_error *err) {
   char fallback[EP_PATH_MAX];
   const char *folder = w->cli->out;
   if (!folder) {
-    snprintf(fallback, sizeof fallback, "results/%s-compare", w->result.name);
+    snprintf(fallback, sizeof fallback, "out/%s-compare", w->result.name);
     folder = fallback;
   }
   EP_TRY(ep_compare_write(folder, &w->result, err));

@@ -6,7 +6,7 @@
 #include "app/scene/hash_text.h"
 
 // Raised whenever a comparison measures something else.
-enum { COMPARE_VERSION = 3 };
+enum { COMPARE_VERSION = 4 };
 
 int ep_weight_sets(int path) {
   return (path & EP_METHOD_LB ? 1 : 0) + (path & EP_METHOD_GREEN ? 1 : 0);
@@ -85,15 +85,40 @@ ep_status ep_bench_prepare(ep_bench *bench, ep_error *err) {
   return EP_OK;
 }
 
-static void hash_loads(ep_hash_text *text, const ep_scene *scene) {
+// Lists and arrays count by what they hold: the name stays when they are edited. One that cannot be
+// read is an error of the run.
+static void hash_selection(ep_hash_text *text, const ep_selection *s, const ep_mesh *mesh) {
+  ep_digest digest;
+  const ep_point_data *data = s->kind == EP_SELECT_FIELD ? ep_mesh_data(mesh, s->path) : NULL;
+  ep_hash_add(text, "where %d %.17g %d", (int)s->kind, s->value, s->equals);
+  ep_hash_add_bytes(text, "a", s->a, sizeof s->a);
+  ep_hash_add_bytes(text, "b", s->b, sizeof s->b);
+  if (s->kind == EP_SELECT_FILE && ep_hash_file(s->path, &digest, NULL) == EP_OK)
+    ep_hash_add(text, "list %s", digest.hex);
+  if (data && data->value)
+    ep_hash_add_bytes(text, "array", data->value, (size_t)mesh->nv * sizeof *data->value);
+}
+
+static void hash_loads(ep_hash_text *text, const ep_bench *bench) {
+  const ep_scene *scene = &bench->scene;
   for (int i = 0; i < scene->nloads; i++) {
     const ep_load *l = &scene->load[i];
-    ep_hash_add(text, "load %d %.17g %.17g %.17g %.17g %.17g %.17g %d %s", l->gravity, l->vector[0],
-                l->vector[1], l->vector[2], l->from, l->until, l->ramp, (int)l->where.kind,
-                l->where.path ? l->where.path : "");
-    ep_hash_add(text, "value %.17g %d", l->where.value, l->where.equals);
-    ep_hash_add_bytes(text, "where", l->where.a, sizeof l->where.a);
-    ep_hash_add_bytes(text, "where", l->where.b, sizeof l->where.b);
+    ep_hash_add(text, "load %d %.17g %.17g %.17g %.17g %.17g %.17g", l->gravity, l->vector[0],
+                l->vector[1], l->vector[2], l->from, l->until, l->ramp);
+    hash_selection(text, &l->where, &bench->shapes.shape[0].mesh);
+  }
+}
+
+// Where the strains of the examples count on the Green-strain path: no stage before it depends on
+// that.
+static void hash_regions(ep_hash_text *text, const ep_bench *bench) {
+  const ep_shapes *shapes = &bench->shapes;
+  for (int i = 0; i < bench->scene.nfamilies; i++) {
+    const int region = bench->scene.family[i].region;
+    ep_hash_add(text, "family %d", region);
+    if (region >= 0)
+      ep_hash_add_bytes(text, "region", shapes->region[region],
+                        (size_t)shapes->shape[0].mesh.nv * sizeof **shapes->region);
   }
 }
 
@@ -109,7 +134,8 @@ ep_digest ep_bench_key(const ep_bench *bench, const char *kind, const ep_frames 
               frames->interval, frames->count, s->dt * s->steps);
   ep_hash_add(&text, "path %d %.17g %.17g %.17g", s->methods, s->green.alpha, s->green.sum_to_one,
               s->green.non_negative);
-  hash_loads(&text, s);
+  hash_loads(&text, bench);
+  hash_regions(&text, bench);
   return ep_hash_done(&text);
 }
 

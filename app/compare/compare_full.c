@@ -4,10 +4,8 @@
 #include <string.h>
 
 #include "app/compare/compare.h"
-#include "app/run/loads.h"
+#include "app/run/stepper.h"
 #include "reduced/bake/full_step.h"
-
-enum { HALVINGS_MAX = 6 };
 
 typedef struct run {
   ep_bench *bench;
@@ -49,7 +47,7 @@ static void set_force(run *r, double t) {
   }
 }
 
-// As in app/run/simulate.c: a failed step is done in two halves.
+// As in app/run/stepper.c: a failed step is done in two halves.
 static ep_status advance(run *r, double t, double dt, int level, ep_error *err) {
   ep_full_report report;
   ep_error here = {0};
@@ -59,7 +57,7 @@ static ep_status advance(run *r, double t, double dt, int level, ep_error *err) 
   r->newton += report.newton_iterations;
   r->energy = report.elastic_energy + report.kinetic_energy;
   if (status == EP_OK) return EP_OK;
-  if (status != EP_ERR_NUMERIC || level == HALVINGS_MAX)
+  if (status != EP_ERR_NUMERIC || level == EP_HALVINGS_MAX)
     return ep_fail(err, status, "t = %.4g s: %s", t, here.text);
   r->halvings++;
   EP_TRY(advance(r, t, dt / 2, level + 1, err));

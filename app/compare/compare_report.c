@@ -64,7 +64,7 @@ static const ep_point *find(const ep_comparison *c, ep_method method, int r, int
     const ep_point *p = &c->point[i];
     if (p->method == method && p->r == r && (method != EP_METHOD_CUBATURE || p->s == s) &&
         p->dt == like->dt && strcmp(p->solver, like->solver) == 0 &&
-        p->material == like->material && p->path == like->path && p->precision == EP_DOUBLE &&
+        p->material == like->material && p->path == like->path && p->precision == like->precision &&
         !p->failed)
       return p;
   }

@@ -5,7 +5,8 @@
 //    time budget, none where nothing fits; the crossover lies where two power laws meet;
 //  - through the real program: the full space agrees with itself, errors fall with r, all elements
 //    have no force error, cubature some; a second sweep takes every point from the cache, also
-//    after one was lost; the table holds what the page shows; mistakes in the section are named.
+//    after one was lost; the table holds what the page shows; mistakes in the section are named;
+//  - what is kept of a sweep is named by what it depends on, to the numbers in a list of vertices.
 #include <jansson.h>
 #include <math.h>
 #include <setjmp.h>
@@ -111,6 +112,27 @@ static void crossover_of_power_laws(void **state) {
   assert_float_equal(x[0].r, 10, 0);
   ep_compare_crossover_text(&c, 60, &x[0], text);
   assert_non_null(strstr(text, "the crossover lies below"));
+}
+
+// Floats are measured against floats: with polynomials twice as fast, 2 r^2 = r^3 / 16 at r = 32.
+static void crossover_of_floats_is_their_own(void **state) {
+  (void)state;
+  ep_scene scene;
+  ep_point point[12];
+  ep_comparison c;
+  make_comparison(&scene, point, &c);
+  for (int i = 0; i < 6; i++) {
+    point[6 + i] = point[i];
+    point[6 + i].precision = EP_FLOAT;
+    if (point[i].method == EP_METHOD_CUBIC) point[6 + i].step_median_us /= 2;
+  }
+  c.count = 12;
+  ep_crossover x[EP_CROSSOVERS];
+  assert_int_equal(ep_compare_crossovers(&c, 60, x), 2);
+  assert_int_equal(x[0].precision, EP_DOUBLE);
+  assert_float_equal(x[0].r, 16, 1e-9);
+  assert_int_equal(x[1].precision, EP_FLOAT);
+  assert_float_equal(x[1].r, 32, 1e-9);
 }
 
 static void budgets_decide(void **state) {
@@ -245,6 +267,47 @@ static void the_program_compares(void **state) {
   free(page);
 }
 
+// The key of a point of beam.yaml with overrides.
+static ep_digest key_of(int nsets, const char *const *sets) {
+  ep_scene scene;
+  ep_cache cache;
+  ep_bench bench;
+  const ep_frames frames = {.count = 10, .interval = 0.02};
+  ASSERT_OK(ep_scene_read("beam.yaml", nsets, sets, &scene, err));
+  ASSERT_OK(ep_cache_open("sweep-cache", &cache, err));
+  const ep_point point = {.r = 8, .path = scene.methods, .material = scene.model, .solver = ""};
+  ASSERT_OK(ep_bench_open(&scene, &point, &cache, NULL, &bench, err));
+  const ep_digest key = ep_bench_key(&bench, "point", &frames);
+  ep_bench_close(&bench);
+  ep_scene_free(&scene);
+  return key;
+}
+
+// A result kept under the name of a list is none of the list that was edited; strains of the
+// Green-strain path count in their region, wherever that goes.
+static void keys_follow_lists_and_regions(void **state) {
+  (void)state;
+  write_box("beam.veg", 6, 2, 2, 1.2, 0, 2e4);
+  write_box("beam-bent.veg", 6, 2, 2, 1.2, 0.2, 0);
+  write_text("beam.yaml", scene_text);
+  const char *list[] = {"loads=[{push: {file: end.txt, force: [0, 6, 2]}}]"};
+  write_text("end.txt", "60, 61\n");
+  const ep_digest before = key_of(1, list);
+  write_text("end.txt", "60, 62\n");
+  const ep_digest edited = key_of(1, list);
+  write_text("end.txt", "60, 61\n");
+  const ep_digest again = key_of(1, list);
+  assert_string_not_equal(before.hex, edited.hex);
+  assert_string_equal(before.hex, again.hex);
+  const char *region[] = {
+      "examples.path=green",
+      "families=[{poses: [beam-bent.veg], region: {box: {low: [0, -1, -1], high: [1, 1, 1]}}}]"};
+  const ep_digest half = key_of(2, region);
+  region[1] =
+      "families=[{poses: [beam-bent.veg], region: {box: {low: [0, -1, -1], high: [0.5, 1, 1]}}}]";
+  assert_string_not_equal(half.hex, key_of(2, region).hex);
+}
+
 static void mistakes_are_named(void **state) {
   (void)state;
   static const struct {
@@ -293,9 +356,14 @@ static void unknown_parts_are_refused(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(errors_are_what_they_say), cmocka_unit_test(crossover_of_power_laws),
-      cmocka_unit_test(budgets_decide),           cmocka_unit_test(the_program_compares),
-      cmocka_unit_test(mistakes_are_named),       cmocka_unit_test(unknown_parts_are_refused),
+      cmocka_unit_test(errors_are_what_they_say),
+      cmocka_unit_test(crossover_of_power_laws),
+      cmocka_unit_test(crossover_of_floats_is_their_own),
+      cmocka_unit_test(keys_follow_lists_and_regions),
+      cmocka_unit_test(budgets_decide),
+      cmocka_unit_test(the_program_compares),
+      cmocka_unit_test(mistakes_are_named),
+      cmocka_unit_test(unknown_parts_are_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
