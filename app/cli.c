@@ -12,15 +12,15 @@ static const char general_help[] =
     "Usage: eigenpose COMMAND [OPTION...] FILE\n"
     "Elastic objects that deform the way example poses suggest, even poses of other meshes.\n"
     "\n"
-    "  run    simulate a scene (baking first what is not baked yet) and write the animation\n"
+    "  run      simulate a scene (baking first what is not baked yet) and write the animation\n"
+    "  bake     prepare a scene: poses, basis, cubature, model; kept in the cache\n"
+    "  check    find what is wrong with meshes or scenes, say where and what to do; repair meshes\n"
+    "  plan     say which stages a scene needs, and why the others are left out\n"
+    "  align    map the examples of a scene to its object and judge the maps\n"
     "  compare  measure methods and settings of a scene against the full space\n"
-    "  report one page of the runs of many scenes, figure by figure\n"
-    "  bake   prepare a scene: poses, basis, cubature, model; kept in the cache\n"
-    "  stress  push a scene far beyond what it was made for, and report what stays sound\n"
-    "  check  find what is wrong with meshes or scenes, say where and what to do; repair meshes\n"
-    "  plan   say which stages a scene needs, and why the others are left out\n"
-    "  align  map the examples of a scene to its object and judge the maps\n"
-    "  eigen  Laplace-Beltrami eigenvalues and eigenfunctions of a tet mesh\n"
+    "  stress   push a scene far beyond what it was made for, and report what stays sound\n"
+    "  report   one page of the runs of many scenes, figure by figure\n"
+    "  eigen    Laplace-Beltrami eigenvalues and eigenfunctions of a tet mesh\n"
     "\n"
     "  eigenpose COMMAND --help   the options of a command\n"
     "  eigenpose --version\n"
@@ -30,6 +30,7 @@ static const char general_help[] =
     "4 unusable mesh, 5 scene, 6 bad map, 7 solver, 8 memory, 9 not supported,\n"
     "10 check found errors.\n";
 
+enum { COUNT_MAX = 100000 };
 enum {
   KEY_COUNT = 'n',
   KEY_OUT = 'o',
@@ -81,6 +82,7 @@ static const struct argp_option report_options[] = {
     {"out", KEY_OUT, "DIR", 0,
      "Folder that holds the runs' folders, and gets the page (default: out)", 0},
     OPTION_JSON,
+    OPTION_QUIET,
     {0}};
 static const struct argp_option scene_options[] = {
     OPTION_JSON,
@@ -111,13 +113,12 @@ static const struct argp_option run_options[] = {
     OPTION_CACHE,
     {0}};
 static const struct argp_option compare_options[] = {
-    {"out", KEY_OUT, "DIR", 0, "Folder of the results (default: out/NAME)", 0},
+    {"out", KEY_OUT, "DIR", 0, "Folder of the page and the tables (default: out/NAME-compare)", 0},
     OPTION_JSON,
     OPTION_QUIET,
     OPTION_SET,
     OPTION_CACHE,
     {0}};
-
 static const struct argp_option stress_options[] = {
     {"out", KEY_OUT, "DIR", 0, "Folder of the report (default: out/NAME-stress)", 0},
     {"quick", KEY_QUICK, 0, 0, "Only the ends of every axis, only the scene itself", 0},
@@ -184,9 +185,17 @@ static error_t take_set(ep_cli *cli, const char *arg, struct argp_state *state) 
 static error_t take_count(ep_cli *cli, const char *arg, struct argp_state *state) {
   char *end;
   const long count = strtol(arg, &end, 10);
-  if (*arg == '\0' || *end || count < 1 || count > 100000)
-    argp_error(state, "--count %s: expected a number from 1", arg);
+  if (*arg == '\0' || *end || count < 1 || count > COUNT_MAX)
+    argp_error(state, "--count %s: expected a number from 1 to %d", arg, COUNT_MAX);
   cli->count = (int)count;
+  return 0;
+}
+
+// A file or folder; an unset variable of a script gives "", which is neither.
+static error_t take_path(const char **out, const char *option, const char *arg,
+                         struct argp_state *state) {
+  if (!*arg) argp_error(state, "--%s is empty; name a file or a folder", option);
+  *out = arg;
   return 0;
 }
 
@@ -196,14 +205,11 @@ static error_t take(int key, char *arg, struct argp_state *state) {
   case KEY_COUNT:
     return take_count(cli, arg, state);
   case KEY_OUT:
-    cli->out = arg;
-    return 0;
+    return take_path(&cli->out, "out", arg, state);
   case KEY_CACHE:
-    cli->cache = arg;
-    return 0;
+    return take_path(&cli->cache, "cache", arg, state);
   case KEY_REPAIR:
-    cli->repair = arg;
-    return 0;
+    return take_path(&cli->repair, "repair", arg, state);
   case KEY_LARGEST:
     cli->largest = true;
     return 0;
@@ -220,8 +226,7 @@ static error_t take(int key, char *arg, struct argp_state *state) {
     cli->kernels = arg;
     return 0;
   case KEY_REPLAY:
-    cli->replay = arg;
-    return 0;
+    return take_path(&cli->replay, "replay", arg, state);
   case KEY_SERVED:
     cli->served = true;
     return 0;

@@ -6,8 +6,6 @@
 
 #include "base/error.h"
 
-#define EP_VERSION "0.1.0"
-
 enum { EP_SETS_MAX = 64, EP_INPUTS_MAX = 256 };
 
 typedef enum ep_command {

@@ -16,6 +16,11 @@ json_t *ep_json_numbers(int count, const double *value) {
   return list;
 }
 
+double ep_json_get_number(const json_t *object, const char *key) {
+  const json_t *value = json_object_get(object, key);
+  return json_is_number(value) ? json_number_value(value) : NAN;
+}
+
 static bool baked(const ep_stage *stage) {
   return stage->runs && ep_stage_is_baked(stage->kind);
 }
@@ -86,4 +91,13 @@ ep_status ep_report_print(json_t *root, ep_error *err) {
   if (!good || putchar('\n') == EOF || fflush(stdout) != 0)
     return ep_fail(err, EP_ERR_IO, "cannot write to stdout: %s", strerror(errno));
   return EP_OK;
+}
+
+ep_status ep_report_write(const char *path, json_t *root, ep_error *err) {
+  char *text = root ? json_dumps(root, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
+  json_decref(root);
+  if (!text) return ep_fail(err, EP_ERR_MEMORY, "no memory for %s", path);
+  const ep_status status = ep_file_write(path, text, strlen(text), err);
+  free(text);
+  return status;
 }

@@ -1,4 +1,4 @@
-// What the commands say: plans, stages, map quality, as JSON and as text.
+// What the commands say: plans and stages, as JSON and as text; reading and writing JSON.
 #ifndef EP_APP_REPORT_H
 #define EP_APP_REPORT_H
 
@@ -11,6 +11,8 @@
 // Numbers JSON cannot hold (NaN, infinity) become null.
 json_t *ep_json_number(double value);
 json_t *ep_json_numbers(int count, const double *value);
+// The number at a key, NaN where there is none (or null).
+double ep_json_get_number(const json_t *object, const char *key);
 
 // [{name, seconds, cached}] of the stages that run in a bake.
 json_t *ep_report_stages(const ep_plan *plan);
@@ -26,5 +28,7 @@ void ep_report_plan_text(const ep_scene *scene, const ep_shapes *shapes, const e
 // Print a report on stdout and release it. Errors: EP_ERR_IO (stdout is full), EP_ERR_MEMORY where
 // root is NULL.
 ep_status ep_report_print(json_t *root, ep_error *err);
+// The same into a file, whole or not at all; every number reads back to the same double.
+ep_status ep_report_write(const char *path, json_t *root, ep_error *err);
 
 #endif

@@ -90,6 +90,7 @@ ep_status ep_file_write(const char *path, const void *bytes, size_t size, ep_err
 
 ep_status ep_make_folders(const char *path, ep_error *err) {
   char partial[EP_PATH_MAX];
+  if (!*path) return ep_fail(err, EP_ERR_IO, "the name of a folder is empty");
   if (strlen(path) >= sizeof partial) return ep_fail(err, EP_ERR_IO, "path too long: %s", path);
   strcpy(partial, path);
   for (char *p = partial + 1;; p++) {
@@ -104,6 +105,15 @@ ep_status ep_make_folders(const char *path, ep_error *err) {
     *p = kept;
     if (!kept) return EP_OK;
   }
+}
+
+ep_status ep_output_folder(const char *path, ep_error *err) {
+  EP_TRY(ep_make_folders(path, err));
+  return access(path, W_OK | X_OK) == 0 ? EP_OK : io_error(err, "cannot write into folder", path);
+}
+
+ep_status ep_file_remove(const char *path, ep_error *err) {
+  return unlink(path) == 0 || errno == ENOENT ? EP_OK : io_error(err, "cannot remove", path);
 }
 
 ep_status ep_path_join(const char *folder, const char *path, char *out, ep_error *err) {

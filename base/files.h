@@ -32,6 +32,10 @@ ep_status ep_file_write(const char *path, const void *bytes, size_t size, ep_err
 
 // mkdir -p.
 ep_status ep_make_folders(const char *path, ep_error *err);
+// The same for a folder of results, which must take files: known before long work, not behind it.
+ep_status ep_output_folder(const char *path, ep_error *err);
+// Remove a file if it is there.
+ep_status ep_file_remove(const char *path, ep_error *err);
 
 // Join base folder and path (kept as it is when absolute) into out (EP_PATH_MAX).
 ep_status ep_path_join(const char *folder, const char *path, char *out, ep_error *err);

@@ -361,13 +361,7 @@ static ep_status picture(sweep *w, const char *folder, ep_error *err) {
   return ep_compare_picture(path, title, &w->session->shapes.shape[0].mesh, &w->reference, err);
 }
 
-static ep_status output(sweep *w, ep_error *err) {
-  char fallback[EP_PATH_MAX];
-  const char *folder = w->cli->out;
-  if (!folder) {
-    snprintf(fallback, sizeof fallback, "out/%s-compare", w->result.name);
-    folder = fallback;
-  }
+static ep_status output(sweep *w, const char *folder, ep_error *err) {
   EP_TRY(ep_compare_write(folder, &w->result, err));
   EP_TRY(picture(w, folder, err));
   if (w->cli->json) return ep_report_print(ep_compare_json(&w->result), err);
@@ -413,8 +407,12 @@ ep_status ep_command_compare(const ep_cli *cli, ep_error *err) {
                         .tets = mesh->nt,
                         .examples = session.shapes.examples,
                         .diagonal = ep_mesh_diagonal(mesh)}};
-  status = do_all(&w, err);
-  if (status == EP_OK) status = output(&w, err);
+  char fallback[EP_PATH_MAX];
+  snprintf(fallback, sizeof fallback, "out/%s-compare", session.scene.name);
+  const char *folder = cli->out ? cli->out : fallback;
+  status = ep_output_folder(folder, err);
+  if (status == EP_OK) status = do_all(&w, err);
+  if (status == EP_OK) status = output(&w, folder, err);
   if (w.petsc) ep_petsc_stop();
   for (int i = 0; i < w.result.count && w.result.point; i++) free(w.result.point[i].error_at);
   free(w.result.point);

@@ -140,7 +140,8 @@ void ep_compare_crossover_text(const ep_comparison *c, int s, const ep_crossover
 // Six moments of a run from rest to its end, as a .png.
 ep_status ep_compare_picture(const char *path, const char *title, const ep_mesh *mesh,
                              const ep_frames *frames, ep_error *err);
-// index.html, chart.svg, chart.png, results.csv, frames.csv, results.json in `folder`.
+// index.html, chart.svg, chart.png, results.csv, frames.csv, results.json in `folder`,
+// which must be there.
 ep_status ep_compare_write(const char *folder, const ep_comparison *c, ep_error *err);
 json_t *ep_compare_json(const ep_comparison *c);
 void ep_compare_text(FILE *out, const ep_comparison *c);

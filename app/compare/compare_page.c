@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "app/compare/compare_charts.h"
+#include "app/report.h"
 
 // ---- tables ------------------------------------------------------------------------------------
 
@@ -217,20 +218,6 @@ static ep_status write_page(const char *path, const ep_comparison *c,
   return status;
 }
 
-static ep_status write_json(const char *path, const ep_comparison *c, ep_error *err) {
-  json_t *root = ep_compare_json(c);
-  ep_output out;
-  if (!root) return ep_fail(err, EP_ERR_MEMORY, "no memory for the report");
-  ep_status status = ep_output_open(&out, path, err);
-  if (status == EP_OK) {
-    json_dumpf(root, out.file, JSON_INDENT(1) | JSON_REAL_PRECISION(9));
-    fputc('\n', out.file);
-    status = ep_output_commit(&out, err);
-  }
-  json_decref(root);
-  return status;
-}
-
 static ep_status write_files(const char *folder, const ep_comparison *c,
                              const ep_compare_charts *charts, ep_error *err) {
   char path[EP_PATH_MAX];
@@ -241,7 +228,7 @@ static ep_status write_files(const char *folder, const ep_comparison *c,
   EP_TRY(ep_path_join(folder, "frames.csv", path, err));
   EP_TRY(ep_compare_write_frames(path, c, charts, err));
   EP_TRY(ep_path_join(folder, "results.json", path, err));
-  EP_TRY(write_json(path, c, err));
+  EP_TRY(ep_report_write(path, ep_compare_json(c), err));
   if (charts->chart[EP_CHART_PARETO].series == 0) return EP_OK;
   EP_TRY(ep_path_join(folder, "chart.svg", path, err));
   EP_TRY(ep_chart_write_svg(path, &charts->chart[EP_CHART_PARETO], err));
@@ -251,7 +238,6 @@ static ep_status write_files(const char *folder, const ep_comparison *c,
 
 ep_status ep_compare_write(const char *folder, const ep_comparison *c, ep_error *err) {
   ep_compare_charts charts;
-  EP_TRY(ep_make_folders(folder, err));
   EP_TRY(ep_compare_charts_make(c, &charts, err));
   const ep_status status = write_files(folder, c, &charts, err);
   ep_compare_charts_free(&charts);

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "app/report.h"
 #include "base/files.h"
 
 typedef struct reader {
@@ -35,13 +36,7 @@ static ep_status text(const reader *r, const json_t *object, const char *where, 
   return EP_OK;
 }
 
-static double number(const json_t *object, const char *key) {
-  const json_t *value = json_object_get(object, key);
-  return json_is_number(value) ? json_number_value(value) : NAN;
-}
-
-// ---- runs
-// ----------------------------------------------------------------------------------------
+// ---- runs --------------------------------------------------------------------------------------
 
 // The last line of run.log that says something.
 static void last_words(const char *path, char *out, size_t size) {
@@ -101,14 +96,14 @@ static ep_status read_papers(const reader *r, const json_t *list, const char *wh
     const json_t *entry = json_array_get(list, i);
     ep_figure_paper *paper = &out->paper[out->npapers++];
     EP_TRY(text(r, entry, where, "model", true, &paper->model));
-    paper->vertices = number(entry, "vertices");
-    paper->tets = number(entry, "tets");
-    paper->examples = number(entry, "examples");
-    paper->m = number(entry, "m");
-    paper->r = number(entry, "r");
-    paper->s = number(entry, "s");
-    paper->t_interp = number(entry, "t_interp");
-    paper->t_total = number(entry, "t_total");
+    paper->vertices = ep_json_get_number(entry, "vertices");
+    paper->tets = ep_json_get_number(entry, "tets");
+    paper->examples = ep_json_get_number(entry, "examples");
+    paper->m = ep_json_get_number(entry, "m");
+    paper->r = ep_json_get_number(entry, "r");
+    paper->s = ep_json_get_number(entry, "s");
+    paper->t_interp = ep_json_get_number(entry, "t_interp");
+    paper->t_total = ep_json_get_number(entry, "t_total");
   }
   return EP_OK;
 }

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "app/figures/figures.h"
+#include "app/report.h"
 #include "base/files.h"
 #include "results/chart.h"
 
@@ -24,19 +25,13 @@ static const char STYLE[] =
     "details ul{margin:.3rem 0;padding-left:1.2rem}.out{color:#566070}"
     ".failed{color:#a11}.good{color:#1e7d4d}.note{color:#566070;font-size:13px}";
 
-static double number(const json_t *object, const char *key) {
-  const json_t *value = json_object_get(object, key);
-  return json_is_number(value) ? json_number_value(value) : NAN;
-}
-
 static void cell(FILE *out, const char *format, double value) {
   fputs("<td>", out);
   if (isfinite(value)) fprintf(out, format, value);
   fputs("</td>", out);
 }
 
-// ---- pictures
-// ------------------------------------------------------------------------------------
+// ---- pictures ----------------------------------------------------------------------------------
 
 static void image(FILE *out, const ep_figure_run *run, const char *file) {
   fputs("<img loading=\"lazy\" src=\"", out);
@@ -59,7 +54,8 @@ static void finals(FILE *out, const ep_figure *figure) {
     fputs("<figcaption>", out);
     ep_write_escaped(out, run->label);
     fprintf(out, ", at %.3g s</figcaption></figure>\n",
-            number(run->summary, "dt") * number(run->summary, "steps_done"));
+            ep_json_get_number(run->summary, "dt") *
+                ep_json_get_number(run->summary, "steps_done"));
   }
   fputs("</div>\n", out);
 }
@@ -105,8 +101,7 @@ static void run_card(FILE *out, const ep_figure_run *run) {
   fputs("</div>\n", out);
 }
 
-// ---- numbers
-// -------------------------------------------------------------------------------------
+// ---- numbers -----------------------------------------------------------------------------------
 
 static void run_row(FILE *out, const ep_figure_run *run) {
   const json_t *s = run->summary, *contact = json_object_get(s, "contact");
@@ -117,21 +112,21 @@ static void run_row(FILE *out, const ep_figure_run *run) {
     fputs("<td colspan=\"14\" class=\"failed\">failed</td></tr>\n", out);
     return;
   }
-  const double steps = number(s, "steps_done"), m = number(s, "m");
-  cell(out, "%.0f", number(s, "vertices"));
-  cell(out, "%.0f", number(s, "tets"));
-  cell(out, "%.0f", number(s, "examples"));
+  const double steps = ep_json_get_number(s, "steps_done"), m = ep_json_get_number(s, "m");
+  cell(out, "%.0f", ep_json_get_number(s, "vertices"));
+  cell(out, "%.0f", ep_json_get_number(s, "tets"));
+  cell(out, "%.0f", ep_json_get_number(s, "examples"));
   cell(out, "%.0f", m > 0 ? m : NAN);
-  cell(out, "%.0f", number(s, "r"));
-  cell(out, "%.0f", number(s, "s"));
-  cell(out, "%.3f", number(s, "t_interp_ms"));
-  cell(out, "%.3f", number(s, "t_step_ms"));
-  cell(out, "%.4g", 1e3 * number(s, "dt"));
-  cell(out, "%.2f", steps > 0 ? number(s, "newton_iterations") / steps : NAN);
-  cell(out, "%.1f", 100 * number(s, "example_fraction_most"));
-  cell(out, "%.1f", 100 * number(s, "example_fraction"));
-  cell(out, "%.2f", 100 * number(contact, "penetration_share"));
-  cell(out, "%.0f", number(s, "inverted_tets"));
+  cell(out, "%.0f", ep_json_get_number(s, "r"));
+  cell(out, "%.0f", ep_json_get_number(s, "s"));
+  cell(out, "%.3f", ep_json_get_number(s, "t_interp_ms"));
+  cell(out, "%.3f", ep_json_get_number(s, "t_step_ms"));
+  cell(out, "%.4g", 1e3 * ep_json_get_number(s, "dt"));
+  cell(out, "%.2f", steps > 0 ? ep_json_get_number(s, "newton_iterations") / steps : NAN);
+  cell(out, "%.1f", 100 * ep_json_get_number(s, "example_fraction_most"));
+  cell(out, "%.1f", 100 * ep_json_get_number(s, "example_fraction"));
+  cell(out, "%.2f", 100 * ep_json_get_number(contact, "penetration_share"));
+  cell(out, "%.0f", ep_json_get_number(s, "inverted_tets"));
   fputs("</tr>\n", out);
 }
 
@@ -153,19 +148,19 @@ static void full_row(FILE *out, const ep_figure_run *run) {
   fputs(", full space", out);
   if (reduced)
     fprintf(out, " (the reduced run stays within %.2g %% of the diagonal)",
-            100 * number(reduced, "position_error"));
+            100 * ep_json_get_number(reduced, "position_error"));
   fputs("</th>", out);
-  cell(out, "%.0f", number(run->full, "vertices"));
-  cell(out, "%.0f", number(run->full, "tets"));
-  cell(out, "%.0f", number(run->full, "examples"));
+  cell(out, "%.0f", ep_json_get_number(run->full, "vertices"));
+  cell(out, "%.0f", ep_json_get_number(run->full, "tets"));
+  cell(out, "%.0f", ep_json_get_number(run->full, "examples"));
   fputs("<td></td><td></td><td></td>", out);
-  const double interpolation = number(full, "target_median_us");
+  const double interpolation = ep_json_get_number(full, "target_median_us");
   cell(out, "%.3g", 1e-3 * interpolation);
-  cell(out, "%.4g", 1e-3 * number(full, "step_median_us"));
-  cell(out, "%.4g", 1e3 * number(full, "dt"));
-  cell(out, "%.2f", number(full, "newton_per_step"));
+  cell(out, "%.4g", 1e-3 * ep_json_get_number(full, "step_median_us"));
+  cell(out, "%.4g", 1e3 * ep_json_get_number(full, "dt"));
+  cell(out, "%.2f", ep_json_get_number(full, "newton_per_step"));
   fputs("<td></td><td></td><td></td>", out);
-  cell(out, "%.0f", number(full, "inverted"));
+  cell(out, "%.0f", ep_json_get_number(full, "inverted"));
   fputs("</tr>\n", out);
 }
 
@@ -204,8 +199,7 @@ static void table(FILE *out, const ep_figure *figure) {
   fputs("</p>\n", out);
 }
 
-// ---- page
-// ----------------------------------------------------------------------------------------
+// ---- page --------------------------------------------------------------------------------------
 
 static void head(FILE *out, const ep_figures *all) {
   fputs("<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "

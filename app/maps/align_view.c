@@ -208,7 +208,6 @@ ep_status ep_align_view_map(const char *folder, ep_bake *bake, const ep_stage *s
                             const ep_map *map, ep_error *err) {
   const ep_shape_file *from = &bake->shapes->shape[stage->from];
   const ep_shape_file *to = &bake->shapes->shape[stage->to];
-  EP_TRY(ep_make_folders(folder, err));
   EP_TRY(ep_bake_lb(bake, stage->from, err));
   EP_TRY(ep_bake_lb(bake, stage->to, err));
   map_view v = {.from = &from->mesh,
@@ -402,7 +401,6 @@ ep_status ep_align_view_pose(const char *folder, ep_bake *bake, int example, ep_
   const char *name = shape[source->shape].name;
   char path[EP_PATH_MAX], file[NAME];
   snprintf(file, sizeof file, "pose-%s", name);
-  EP_TRY(ep_make_folders(folder, err));
   ep_status status = fill_pose_view(bake, source, u, &v, err);
   if (status == EP_OK) status = file_path(folder, file, ".png", path, err);
   if (status == EP_OK) status = draw_pose(&v, name, &bake->quality[example], path, err);

@@ -4,7 +4,7 @@
 
 #include "app/bake/bake.h"
 
-// In folder, for the map of a stage (its name with '-' for ':' and '/'):
+// In folder, which must be there, for the map of a stage (its name with '-' for ':' and '/'):
 //   NAME.png            both shapes, the same colour where mapped
 //   NAME-functions.png  eigenfunctions 1-4 of the one above the coupled ones of the other
 //   NAME.vtu            the first shape with images, colours and functions; NAME-example.vtu: other

@@ -78,6 +78,7 @@ static void print_text(const ep_bake *bake, int maps) {
 ep_status ep_command_align(const ep_cli *cli, ep_session *session, ep_bake *bake, ep_error *err) {
   int maps;
   bake->look = true;
+  if (cli->out) EP_TRY(ep_output_folder(cli->out, err));
   EP_TRY(make_maps(cli, bake, &maps, err));
   EP_TRY(ep_bake_poses(bake, err));
   if (bake->quality) note_inverted(bake);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "app/report.h"
 #include "app/run/strip.h"
 #include "mesh/io.h"
 #include "results/csv.h"
@@ -255,7 +256,6 @@ ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_s
                            ep_error *err) {
   const ep_mesh *mesh = &shapes->shape[0].mesh;
   if (record->rows == 0) return EP_OK;
-  EP_TRY(ep_make_folders(folder, err));
   EP_TRY(write_csv(folder, model, record, err));
   int *row = malloc(((size_t)record->rows + 1) * sizeof *row);
   if (!row) return no_memory(err);
@@ -277,11 +277,6 @@ ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_s
 
 // ---- summary ---------------------------------------------------------------------------------
 
-static double number(const json_t *object, const char *key) {
-  const json_t *value = json_object_get(object, key);
-  return json_is_number(value) ? json_number_value(value) : NAN;
-}
-
 static void text_weights(FILE *out, const json_t *report) {
   const json_t *weights = json_object_get(report, "weights");
   const json_t *green = json_object_get(report, "green_weights");
@@ -302,9 +297,9 @@ static void text_weights(FILE *out, const json_t *report) {
     fprintf(out, "%s example %zu %.3f", i ? "," : "final Green-strain weights:", i + 1,
             json_number_value(json_array_get(green, i)));
   if (json_array_size(green)) fprintf(out, "\n");
-  if (number(report, "examples") > 0)
+  if (ep_json_get_number(report, "examples") > 0)
     fprintf(out, "example fraction: %.3f of the way from rest to the nearest example\n",
-            number(report, "example_fraction"));
+            ep_json_get_number(report, "example_fraction"));
 }
 
 static void text_vector(FILE *out, const json_t *list, size_t first) {
@@ -332,39 +327,51 @@ void ep_summary_text(FILE *out, const json_t *report) {
   size_t index;
   json_t *stage;
   fprintf(out, "%s: %.0f vertices, %.0f tets, %.0f examples\n",
-          json_string_value(json_object_get(report, "scene")), number(report, "vertices"),
-          number(report, "tets"), number(report, "examples"));
+          json_string_value(json_object_get(report, "scene")),
+          ep_json_get_number(report, "vertices"), ep_json_get_number(report, "tets"),
+          ep_json_get_number(report, "examples"));
   fprintf(out, "m = %.0f eigenfunctions, r = %.0f modes, s = %.0f cubature elements\n",
-          number(report, "m"), number(report, "r"), number(report, "s"));
-  json_array_foreach(json_object_get(report, "stages"), index, stage) fprintf(
-      out, "  %-30s %8.3f s%s\n", json_string_value(json_object_get(stage, "name")),
-      number(stage, "seconds"), json_is_true(json_object_get(stage, "cached")) ? "  (cached)" : "");
+          ep_json_get_number(report, "m"), ep_json_get_number(report, "r"),
+          ep_json_get_number(report, "s"));
+  json_array_foreach(json_object_get(report, "stages"), index, stage)
+      fprintf(out, "  %-30s %8.3f s%s\n", json_string_value(json_object_get(stage, "name")),
+              ep_json_get_number(stage, "seconds"),
+              json_is_true(json_object_get(stage, "cached")) ? "  (cached)" : "");
   const json_t *error = json_object_get(report, "cubature_error");
-  if (number(report, "s") > 0)
+  if (ep_json_get_number(report, "s") > 0)
     fprintf(out, "cubature: relative force error %.3g in training, %.3g held out\n",
-            number(error, "train"), number(error, "held_out"));
+            ep_json_get_number(error, "train"), ep_json_get_number(error, "held_out"));
   fprintf(out, "%.0f of %.0f steps of %.4g s; median %.3f ms a step, %.3f ms of it interpolation\n",
-          number(report, "steps_done"), number(report, "steps"), number(report, "dt"),
-          number(report, "t_step_ms"), number(report, "t_interp_ms"));
+          ep_json_get_number(report, "steps_done"), ep_json_get_number(report, "steps"),
+          ep_json_get_number(report, "dt"), ep_json_get_number(report, "t_step_ms"),
+          ep_json_get_number(report, "t_interp_ms"));
   text_weights(out, report);
   text_motion(out, report);
   const json_t *contact = json_object_get(report, "contact");
   if (contact)
     fprintf(out, "contact: up to %.0f vertices touch; deepest %.3g m, %.2f %% of the diagonal\n",
-            number(contact, "touching"), number(contact, "penetration"),
-            100 * number(contact, "penetration_share"));
-  fprintf(out, "inverted tets: at most %.0f after any step\n", number(report, "inverted_tets"));
+            ep_json_get_number(contact, "touching"), ep_json_get_number(contact, "penetration"),
+            100 * ep_json_get_number(contact, "penetration_share"));
+  fprintf(out, "inverted tets: at most %.0f after any step\n",
+          ep_json_get_number(report, "inverted_tets"));
 }
 
-ep_status ep_outputs_summary(const char *folder, const json_t *report, ep_error *err) {
+ep_status ep_outputs_begin(const char *folder, ep_error *err) {
+  static const char *const verdicts[] = {"summary.json", "summary.txt"};
+  char path[EP_PATH_MAX];
+  EP_TRY(ep_output_folder(folder, err));
+  for (size_t i = 0; i < sizeof verdicts / sizeof *verdicts; i++) {
+    EP_TRY(ep_path_join(folder, verdicts[i], path, err));
+    EP_TRY(ep_file_remove(path, err));
+  }
+  return EP_OK;
+}
+
+ep_status ep_outputs_summary(const char *folder, json_t *report, ep_error *err) {
   char path[EP_PATH_MAX];
   ep_output out;
-  EP_TRY(ep_make_folders(folder, err));
   EP_TRY(ep_path_join(folder, "summary.json", path, err));
-  EP_TRY(ep_output_open(&out, path, err));
-  json_dumpf(report, out.file, JSON_INDENT(2) | JSON_REAL_PRECISION(15));
-  fputc('\n', out.file);
-  EP_TRY(ep_output_commit(&out, err));
+  EP_TRY(ep_report_write(path, json_incref(report), err));
   EP_TRY(ep_path_join(folder, "summary.txt", path, err));
   EP_TRY(ep_output_open(&out, path, err));
   ep_summary_text(out.file, report);

@@ -6,7 +6,11 @@
 
 #include "app/run/simulate.h"
 
-// Write what scene->formats asks for into `folder` (made if needed), plus trajectory.csv. A record
+// Make the folder, see that it takes files, and take away the summary of an earlier run: a folder
+// with a summary holds a whole run.
+ep_status ep_outputs_begin(const char *folder, ep_error *err);
+
+// Write what scene->formats asks for into `folder` (begun), plus trajectory.csv. A record
 // cut short by a failure is written as far as it goes.
 //   frames/frame-0000.vtu .. and animation.pvd; animation.glb; strip.png, final.png
 ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_shapes *shapes,
@@ -14,7 +18,7 @@ ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_s
                            ep_error *err);
 
 // summary.json (the report as printed by --json) and summary.txt.
-ep_status ep_outputs_summary(const char *folder, const json_t *report, ep_error *err);
+ep_status ep_outputs_summary(const char *folder, json_t *report, ep_error *err);
 
 // The lines of summary.txt into an open stream.
 void ep_summary_text(FILE *out, const json_t *report);

@@ -180,6 +180,11 @@ static json_t *make_report(const ep_session *session, const ep_model_file *file,
 
 static ep_status report_run(const ep_cli *cli, ep_session *session, const ep_model_file *model,
                             const ep_record *record, const char *folder, ep_error *err) {
+  if (record->max_inverted)
+    ep_warn(&session->log,
+            "up to %d tets are inside out after a step: weaken the loads, raise "
+            "reduction.elements, or see with 'eigenpose check' whether the material is in SI units",
+            record->max_inverted);
   json_t *report = make_report(session, model, record, folder);
   if (!report) return ep_fail(err, EP_ERR_MEMORY, "no memory for the report");
   ep_status status = ep_outputs_summary(folder, report, err);
@@ -193,12 +198,7 @@ static ep_status report_run(const ep_cli *cli, ep_session *session, const ep_mod
 }
 
 static ep_status simulate(const ep_cli *cli, ep_session *session, const ep_model_file *model,
-                          ep_error *err) {
-  char folder[EP_PATH_MAX];
-  if (cli->out)
-    EP_TRY(ep_path_join(".", cli->out, folder, err));
-  else
-    EP_TRY(ep_path_join("out", session->scene.name, folder, err));
+                          const char *folder, ep_error *err) {
   ep_record record;
   const ep_status simulated = ep_simulate(&session->scene, &session->shapes, &model->model,
                                           cli->kernels, &session->log, &record, err);
@@ -231,10 +231,14 @@ static ep_status check_kernels(const char *name, ep_error *err) {
 ep_status ep_command_run(const ep_cli *cli, ep_error *err) {
   ep_session session;
   ep_model_file model = {0};
+  char fallback[EP_PATH_MAX];
   EP_TRY(check_kernels(cli->kernels, err));
   EP_TRY(ep_session_open(cli, &session, err));
-  ep_status status = get_model(cli, &session, &model, err);
-  if (status == EP_OK) status = simulate(cli, &session, &model, err);
+  ep_status status = ep_path_join("out", session.scene.name, fallback, err);
+  const char *folder = cli->out ? cli->out : fallback;
+  if (status == EP_OK) status = ep_outputs_begin(folder, err);
+  if (status == EP_OK) status = get_model(cli, &session, &model, err);
+  if (status == EP_OK) status = simulate(cli, &session, &model, folder, err);
   ep_model_file_close(&model);
   ep_session_close(&session);
   return status;

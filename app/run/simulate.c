@@ -33,7 +33,7 @@ static ep_status make_record(const ep_scene *scene, const ep_model *model, ep_re
   }
   const bool lb = model->size.k && model->size.m, green = model->size.greens > 0;
   if (lb) out->weights = calloc(rows * shapes, sizeof *out->weights);
-  if (green) out->green_weights = calloc(rows * shapes, sizeof *out->green_weights);
+  if (green) out->green_weights = calloc(rows * (size_t)model->size.k, sizeof *out->green_weights);
   if (scene->nobstacles) out->contact = calloc(rows * EP_CONTACT_COLUMNS, sizeof *out->contact);
   const bool good = (out->contact || !scene->nobstacles) && out->time && out->q && out->velocity &&
                     out->energy && out->step_ms && out->target_ms && (out->weights || !lb) &&
@@ -179,8 +179,9 @@ static int ascending(const void *a, const void *b) {
 }
 
 double ep_median(int count, const double *value) {
-  double *sorted = count > 0 ? malloc((size_t)count * sizeof *sorted) : NULL;
-  if (!sorted) return 0;
+  if (count <= 0) return 0;
+  double *sorted = malloc((size_t)count * sizeof *sorted);
+  if (!sorted) return NAN;
   memcpy(sorted, value, (size_t)count * sizeof *sorted);
   qsort(sorted, (size_t)count, sizeof *sorted, ascending);
   const double median = 0.5 * (sorted[(count - 1) / 2] + sorted[count / 2]);

@@ -43,7 +43,7 @@ void ep_place(const ep_model *model, const ep_frame *frame, double *x);
 // Positions in the world after a step (n x 3).
 void ep_record_positions(const ep_model *model, const ep_record *record, int row, double *x);
 
-// Median of count values; 0 for none.
+// Median of count values; 0 for none, NaN without memory.
 double ep_median(int count, const double *value);
 
 // How far shape q has gone from rest towards an example, <u, u_ex>_M / <u_ex, u_ex>_M. The modes

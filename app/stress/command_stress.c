@@ -6,13 +6,8 @@
 #include "app/stress/stress.h"
 #include "linalg/petsc.h"
 
-static ep_status output(const ep_cli *cli, const ep_stress_report *report, ep_error *err) {
-  char fallback[EP_PATH_MAX];
-  const char *folder = cli->out;
-  if (!folder) {
-    snprintf(fallback, sizeof fallback, "out/%s-stress", report->name);
-    folder = fallback;
-  }
+static ep_status output(const ep_cli *cli, const char *folder, const ep_stress_report *report,
+                        ep_error *err) {
   EP_TRY(ep_stress_write(folder, report, err));
   if (cli->json) return ep_report_print(ep_stress_json(report), err);
   ep_stress_text(stdout, report);
@@ -34,6 +29,10 @@ static ep_status verdict(const ep_stress_report *report, ep_error *err) {
 static ep_status sweep(const ep_cli *cli, ep_session *session, ep_error *err) {
   ep_stress_case *cases;
   ep_stress_report report = {.name = session->scene.name};
+  char fallback[EP_PATH_MAX];
+  snprintf(fallback, sizeof fallback, "out/%s-stress", session->scene.name);
+  const char *folder = cli->out ? cli->out : fallback;
+  EP_TRY(ep_output_folder(folder, err));
   EP_TRY(ep_stress_list(session, cli->quick, &report.count, &cases, err));
   ep_stress_result *result = calloc((size_t)report.count, sizeof *result);
   ep_status status =
@@ -47,7 +46,7 @@ static ep_status sweep(const ep_cli *cli, ep_session *session, ep_error *err) {
   ep_progress_end(&session->log);
   report.result = result;
   report.seconds = ep_seconds() - started;
-  if (status == EP_OK) status = output(cli, &report, err);
+  if (status == EP_OK) status = output(cli, folder, &report, err);
   if (status == EP_OK) status = verdict(&report, err);
   for (int i = 0; i < report.count && result; i++) ep_stress_result_free(&result[i]);
   free(result);

@@ -87,15 +87,6 @@ static json_t *failure_json(const ep_stress_result *r) {
                    ep_json_numbers(3, r->velocity), "spin", ep_json_numbers(3, r->spin));
 }
 
-static ep_status write_json(const char *path, json_t *root, ep_error *err) {
-  char *text = root ? json_dumps(root, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
-  json_decref(root);
-  if (!text) return ep_fail(err, EP_ERR_MEMORY, "no memory for %s", path);
-  const ep_status status = ep_file_write(path, text, strlen(text), err);
-  free(text);
-  return status;
-}
-
 static ep_status write_failures(const char *folder, const ep_stress_report *report, ep_error *err) {
   char path[EP_PATH_MAX], name[96];
   for (int i = 0; i < report->count; i++) {
@@ -104,7 +95,7 @@ static ep_status write_failures(const char *folder, const ep_stress_report *repo
     EP_TRY(ep_make_folders(path, err));
     snprintf(name, sizeof name, "failures/case-%04d.json", i + 1);
     EP_TRY(ep_path_join(folder, name, path, err));
-    EP_TRY(write_json(path, failure_json(&report->result[i]), err));
+    EP_TRY(ep_report_write(path, failure_json(&report->result[i]), err));
   }
   return EP_OK;
 }
@@ -261,6 +252,6 @@ ep_status ep_stress_write(const char *folder, const ep_stress_report *report, ep
   EP_TRY(write_text(folder, "index.html", report, page, err));
   EP_TRY(write_text(folder, "results.csv", report, csv, err));
   EP_TRY(ep_path_join(folder, "results.json", path, err));
-  EP_TRY(write_json(path, ep_stress_json(report), err));
+  EP_TRY(ep_report_write(path, ep_stress_json(report), err));
   return write_failures(folder, report, err);
 }
