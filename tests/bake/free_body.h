@@ -3,12 +3,9 @@
 #ifndef EP_TESTS_BAKE_FREE_BODY_H
 #define EP_TESTS_BAKE_FREE_BODY_H
 
-#include "bar.h"
-
 #include "linalg/petsc.h"
 #include "reduced/bake/inertia.h"
-#include "reduced/bake/model_build.h"
-#include "reduced/eigenpose.h"
+#include "whole_model.h"
 
 enum { FREE_FUNCTIONS = 4 };
 
@@ -19,33 +16,23 @@ typedef struct free_body {
   ep_basis basis;
   double *pose, *phi;             // (examples x 3n), (FREE_FUNCTIONS x n)
   const ep_contact_tree *contact; // borrowed, or NULL
-  ep_model_memory memory;
-  const ep_model *model;
-  void *block;
+  whole_model whole;
+  const ep_model *model; // of it
   ep_state *state;
 } free_body;
 
 // The model and a state from f->basis.
 static inline void finish_free_body(free_body *f) {
-  const int nv = f->b.mesh.nv, nt = f->b.mesh.nt;
-  int *all = malloc((size_t)nt * sizeof *all);
-  for (int e = 0; e < nt; e++) all[e] = e;
-  const ep_lb lb = {.n = nv, .m = FREE_FUNCTIONS, .volume = 1, .phi = f->phi};
-  const ep_model_parts parts = {.fem = &f->b.fem,
-                                .basis = &f->basis,
-                                .m = f->basis.examples ? FREE_FUNCTIONS : 0,
-                                .lb = &lb,
-                                .lb_mass = &f->mass,
-                                .s = nt,
-                                .tet = all,
-                                .weight = f->b.fem.volume,
-                                .contact = f->contact};
-  ASSERT_OK(ep_model_build(&parts, &f->memory, err));
-  free(all);
-  f->model = &f->memory.model;
-  const size_t bytes = ep_state_bytes(f->model);
-  f->block = aligned_alloc(64, (bytes + 63) / 64 * 64);
-  assert_int_equal(ep_state_init(f->model, f->block, bytes, &f->state), EP_OK);
+  const ep_lb lb = {.n = f->b.mesh.nv, .m = FREE_FUNCTIONS, .volume = 1, .phi = f->phi};
+  make_whole_model((ep_model_parts){.fem = &f->b.fem,
+                                    .basis = &f->basis,
+                                    .m = f->basis.examples ? FREE_FUNCTIONS : 0,
+                                    .lb = &lb,
+                                    .lb_mass = &f->mass,
+                                    .contact = f->contact},
+                   &f->whole);
+  f->model = &f->whole.memory.model;
+  f->state = f->whole.state;
 }
 
 // Mesh, masses and `linear` modes only.
@@ -80,13 +67,12 @@ static inline void make_free_body(free_body *f, const int cells[3], const double
 }
 
 static inline void drop_free_body(free_body *f) {
-  ep_model_memory_free(&f->memory);
+  free_whole_model(&f->whole);
   ep_basis_free(&f->basis);
   ep_modes_free(&f->modes);
   ep_csr_free(&f->mass);
   free(f->pose);
   free(f->phi);
-  free(f->block);
   free_bar(&f->b);
 }
 

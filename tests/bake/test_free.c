@@ -123,7 +123,8 @@ static void momenta_are_kept(void **state) {
   for (int kind = 0; kind < EP_INTEGRATORS; kind++) {
     const double velocity[3] = {0.5, -0.2, 0.1}, spin[3] = {2, 9, 4};
     double center[3], linear[3], angular[3], c[3], p[3], l[3];
-    assert_int_equal(ep_state_init(f.model, f.block, ep_state_bytes(f.model), &f.state), EP_OK);
+    assert_int_equal(ep_state_init(f.model, f.whole.block, ep_state_bytes(f.model), &f.state),
+                     EP_OK);
     memcpy(ep_state_q(f.state), f.model->example_q, (size_t)f.model->size.r * sizeof(double));
     assert_int_equal(ep_state_set_motion(f.state, velocity, spin), EP_OK);
     motion_of(&f, x, v);
@@ -182,7 +183,8 @@ static void euler_solution(const double j[3], double time, int steps, double y[1
 // Largest difference of the axes over the tumbling time; a stiff body spun about its middle axis.
 static double tumble(free_body *f, double dt, double *energy_drift) {
   const double time = 6, spin[3] = {0.05, 6, 0.02}, velocity[3] = {0}; // turns over three times
-  assert_int_equal(ep_state_init(f->model, f->block, ep_state_bytes(f->model), &f->state), EP_OK);
+  assert_int_equal(ep_state_init(f->model, f->whole.block, ep_state_bytes(f->model), &f->state),
+                   EP_OK);
   assert_int_equal(ep_state_set_motion(f->state, velocity, spin), EP_OK);
   const double *s0 = f->model->rigid_s0;
   const double j[3] = {s0[1] + s0[2], s0[2] + s0[0], s0[0] + s0[1]};
@@ -234,7 +236,8 @@ static void fast_spin_is_stable(void **state) {
   for (int kind = 0; kind < EP_INTEGRATORS; kind++)
     for (int i = 0; i < 3 && kind != EP_NEWMARK; i++) { // Newmark damps nothing: small steps
       const double still[3] = {0}, spin[3] = {0.1 * speeds[i], 0.2 * speeds[i], speeds[i]};
-      assert_int_equal(ep_state_init(f.model, f.block, ep_state_bytes(f.model), &f.state), EP_OK);
+      assert_int_equal(ep_state_init(f.model, f.whole.block, ep_state_bytes(f.model), &f.state),
+                       EP_OK);
       assert_int_equal(ep_state_set_motion(f.state, still, spin), EP_OK);
       ep_step_def def = ep_default_step();
       ep_step_report report;

@@ -20,7 +20,8 @@ static const ep_elastic SOFT = {.density = 1000, .young = 1e5, .poisson = 0.3};
 static const ep_elastic STIFF = {.density = 1000, .young = 1e10, .poisson = 0.3};
 
 static void reset(free_body *f, const double velocity[3], const double spin[3]) {
-  assert_int_equal(ep_state_init(f->model, f->block, ep_state_bytes(f->model), &f->state), EP_OK);
+  assert_int_equal(ep_state_init(f->model, f->whole.block, ep_state_bytes(f->model), &f->state),
+                   EP_OK);
   assert_int_equal(ep_state_set_motion(f->state, velocity, spin), EP_OK);
 }
 

@@ -9,9 +9,8 @@
 //  - a failed step leaves the motion as it was.
 #include "reduced/bake/full_step.h"
 
-#include "bar.h"
+#include "whole_model.h"
 
-#include "reduced/bake/model_build.h"
 #include "tests/petsc_session.h"
 
 static const ep_elastic SOFT = {.density = 1000, .young = 2e5, .poisson = 0.35};
@@ -28,54 +27,9 @@ typedef struct complete {
   ep_basis basis;
   double *phi, *pose; // (FUNCTIONS x n), (EXAMPLES x 3n)
   ep_green_full green;
-  ep_model_memory memory;
-  void *block;
-  ep_state *state;
+  whole_model whole;
+  ep_state *state; // of it
 } complete;
-
-static double mass_product(const complete *c, const double *x, const double *y) {
-  double *my = vector_of(c->b.n3), sum = 0;
-  ep_csr_multiply(&c->mass, 1, y, my);
-  for (size_t i = 0; i < c->b.n3; i++) sum += x[i] * my[i];
-  free(my);
-  return sum;
-}
-
-// Gram-Schmidt (twice) of the unit vectors of all free unknowns.
-static void make_basis(complete *c) {
-  const size_t n3 = c->b.n3;
-  ep_basis *basis = &c->basis;
-  basis->n = c->b.mesh.nv;
-  basis->u = vector_of(n3 * n3);
-  for (size_t i = 0; i < n3; i++) {
-    double *row = basis->u + (size_t)basis->r * n3;
-    if (c->b.fem.held[i]) continue;
-    row[i] = 1;
-    for (int pass = 0; pass < 2; pass++)
-      for (int a = 0; a < basis->r; a++) {
-        const double *other = basis->u + (size_t)a * n3, along = mass_product(c, row, other);
-        for (size_t j = 0; j < n3; j++) row[j] -= along * other[j];
-      }
-    const double norm = sqrt(mass_product(c, row, row));
-    for (size_t j = 0; j < n3; j++) row[j] /= norm;
-    basis->r++;
-  }
-}
-
-static void project_stiffness(complete *c) {
-  const size_t n3 = c->b.n3, r = (size_t)c->basis.r;
-  double *image = vector_of(n3);
-  c->basis.stiffness = vector_of(r * r);
-  for (size_t a = 0; a < r; a++) {
-    ep_csr_multiply(&c->k0, 1, c->basis.u + a * n3, image);
-    for (size_t b = 0; b < r; b++)
-      for (size_t i = 0; i < n3; i++)
-        c->basis.stiffness[b * r + a] += c->basis.u[b * n3 + i] * image[i];
-  }
-  for (size_t a = 0; a < r; a++) // symmetric to the last bit
-    for (size_t b = 0; b < a; b++) c->basis.stiffness[a * r + b] = c->basis.stiffness[b * r + a];
-  free(image);
-}
 
 static void make_examples(complete *c) {
   const size_t n3 = c->b.n3, r = (size_t)c->basis.r;
@@ -86,7 +40,7 @@ static void make_examples(complete *c) {
   for (size_t i = 0; i < EXAMPLES; i++) {
     smooth_random(&c->b, 100 + i, 0.08, c->pose + i * n3);
     for (size_t a = 0; a < r; a++)
-      c->basis.example_q[i * r + a] = mass_product(c, c->basis.u + a * n3, c->pose + i * n3);
+      c->basis.example_q[i * r + a] = product_of(&c->mass, c->basis.u + a * n3, c->pose + i * n3);
   }
   c->phi = vector_of(FUNCTIONS * (size_t)c->b.mesh.nv);
   for (int f = 0; f < FUNCTIONS; f++)
@@ -103,8 +57,7 @@ static void make_complete(complete *c, ep_material law, int paths) {
   ASSERT_OK(ep_fem_mass(&c->b.fem, &c->mass, err));
   ASSERT_OK(ep_fem_scalar_mass(&c->b.fem, &c->lb_mass, err));
   ASSERT_OK(ep_fem_rest_stiffness(&c->b.fem, &c->k0, err));
-  make_basis(c);
-  project_stiffness(c);
+  make_complete_basis(&c->b, &c->mass, &c->k0, &c->basis);
   if (paths) make_examples(c);
   if (paths & GREEN) {
     ASSERT_OK(ep_green_coefficients_compute(&c->b.fem, &c->basis, NULL, c->b.fem.volume, NULL, NULL,
@@ -112,29 +65,20 @@ static void make_complete(complete *c, ep_material law, int paths) {
     ASSERT_OK(ep_green_full_create(&c->b.fem, c->b.fem.volume, EXAMPLES, c->pose, NULL, NULL,
                                    &c->green, err));
   }
-  const int nt = c->b.mesh.nt;
-  int *all = malloc((size_t)nt * sizeof *all);
-  for (int e = 0; e < nt; e++) all[e] = e;
   const ep_lb lb = {.n = c->b.mesh.nv, .m = FUNCTIONS, .volume = 0.2, .phi = c->phi};
-  const ep_model_parts parts = {.fem = &c->b.fem,
-                                .basis = &c->basis,
-                                .m = paths & LB ? FUNCTIONS : 0,
-                                .green = paths & GREEN ? &green : NULL,
-                                .lb = &lb,
-                                .lb_mass = &c->lb_mass,
-                                .s = nt,
-                                .tet = all,
-                                .weight = c->b.fem.volume};
-  ASSERT_OK(ep_model_build(&parts, &c->memory, err));
-  free(all);
+  make_whole_model((ep_model_parts){.fem = &c->b.fem,
+                                    .basis = &c->basis,
+                                    .m = paths & LB ? FUNCTIONS : 0,
+                                    .green = paths & GREEN ? &green : NULL,
+                                    .lb = &lb,
+                                    .lb_mass = &c->lb_mass},
+                   &c->whole);
+  c->state = c->whole.state;
   ep_green_coefficients_free(&green);
-  const size_t bytes = (ep_state_bytes(&c->memory.model) + 63) / 64 * 64;
-  c->block = aligned_alloc(64, bytes);
-  assert_int_equal(ep_state_init(&c->memory.model, c->block, bytes, &c->state), EP_OK);
 }
 
 static void free_complete(complete *c) {
-  ep_model_memory_free(&c->memory);
+  free_whole_model(&c->whole);
   ep_green_full_free(&c->green);
   ep_basis_free(&c->basis);
   ep_csr_free(&c->mass);
@@ -142,7 +86,6 @@ static void free_complete(complete *c) {
   ep_csr_free(&c->k0);
   free(c->phi);
   free(c->pose);
-  free(c->block);
   free_bar(&c->b);
 }
 
@@ -198,8 +141,7 @@ static double difference_of_runs(complete *c, complete *guide, const ep_step_def
     ASSERT_OK(ep_full_step(full, &def, &full_report, err));
     double square = 0, size = 0;
     for (size_t k = 0; k < n3; k++) {
-      double x = 0;
-      for (size_t a = 0; a < r; a++) x += c->basis.u[a * n3 + k] * ep_state_q(c->state)[a];
+      const double x = nodal_of(&c->basis, ep_state_q(c->state), k);
       square = fmax(square, fabs(x - ep_full_displacement(full)[k]));
       size = fmax(size, fabs(x));
     }
