@@ -137,10 +137,13 @@ static ep_status make_pose(pose_maker *m, ep_pose_kind kind, double *q, double *
     *shrunk += attempt > 0;
     return EP_OK;
   }
-  return ep_fail(err, EP_ERR_NUMERIC,
-                 "cubature: no training pose of kind %d without crushed elements; look at the "
-                 "example poses (inverted tets?) or lower reduction.amplitude",
-                 (int)kind);
+  static const char *const names[EP_POSE_KINDS] = {"at random", "along an example's path",
+                                                   "relative to an example"};
+  return ep_fail(
+      err, EP_ERR_NUMERIC,
+      "cubature: no training pose %s without crushed elements; look at the example poses "
+      "(inverted tets?) or lower reduction.amplitude",
+      names[kind]);
 }
 
 static ep_pose_kind kind_of(const ep_basis *basis, int i, int count) {

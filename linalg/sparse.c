@@ -63,7 +63,8 @@ static ep_status count_rows(int nv, const int *tets, const incidence *inc, int b
   for (int i = 0; i < nv; i++) {
     const int width = block * neighbours(inc, tets, i, mark, list, 0);
     if (total + (long long)block * width > INT_MAX)
-      return ep_fail(err, EP_ERR_UNSUPPORTED, "matrix of %d vertices has over 2^31 entries", nv);
+      return ep_fail(err, EP_ERR_UNSUPPORTED,
+                     "matrix of %d vertices has 2^31 entries or more; use a coarser mesh", nv);
     for (int a = 0; a < block; a++, total += width) out->start[block * i + a] = (int)total;
   }
   out->start[out->n] = (int)total;

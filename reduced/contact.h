@@ -1,6 +1,6 @@
 // Contact of the reduced object with rigid obstacles (DESIGN "Contact"). Surface vertices are found
 // by a tree of bounding balls whose centres and radii follow q (James and Pai 2004, BD-Tree:
-// output- sensitive collision detection for reduced deformable models), so the cost follows the
+// output-sensitive collision detection for reduced deformable models), so the cost follows the
 // number of vertices that touch. Each acts by reduced/contact_point.h, its gradient pulled back by
 // [R U_i, I, -(x - c) x]. Nothing is stored per vertex.
 //
@@ -11,7 +11,8 @@
 
 #include "reduced/eigenpose.h"
 
-// 1 where the model knows its surface and the step has obstacles: all functions below need it.
+// 1 where the model knows its surface and the step has obstacles; else the functions below do
+// nothing and return 0.
 int ep_contact_acts(const ep_state *state, const ep_step_def *def);
 
 // The step's beginning (q_start, start) and where free flight would take the object (q_ahead,

@@ -300,32 +300,47 @@ static void fill_softening(ep_state *state, const double w[3]) {
     }
 }
 
+// log(A^T B)
+static void difference_of(const double a[9], const double b[9], double log[3]) {
+  double back[9], turn[9];
+  for (int i = 0; i < 9; i++) back[i] = a[i % 3 * 3 + i / 3];
+  ep_multiply3(back, b, turn);
+  ep_rotation_log(turn, log);
+}
+
+// c (r x r) = C of the mean angular velocity from the step's start to f->turned.
+static void fill_mean_coriolis(const ep_free_step *f, double *c) {
+  double omega[3];
+  difference_of(f->state->frame.R, f->turned, omega);
+  for (int i = 0; i < 3; i++) omega[i] /= f->def->dt;
+  fill_coriolis(f->state->model, omega, c);
+}
+
+// a and b (r), known in the axes of the step's start, in those of its end.
+static void turn_both(const ep_free_step *f, const double *c, double *a, double *b) {
+  ep_state *state = f->state;
+  const int r = state->model->size.r;
+  turn(r, c, -f->def->dt, a, state->work, state->free_scratch);
+  turn(r, c, -f->def->dt, b, state->work, state->free_scratch);
+}
+
 void ep_free_freeze(ep_free_step *f, const double *x, const double *rotation) {
   ep_state *state = f->state;
   const int r = state->model->size.r;
   const size_t bytes = (size_t)r * sizeof *x;
-  double back[9], psi[3], omega[3], s[6], l[3], l_body[3];
+  double s[6], l[3], l_body[3];
   memcpy(state->free_at, x, bytes);
   f->sound = free_rotation(f, x);
   if (!f->sound) return;
   memset(f->zeta, 0, sizeof f->zeta);
   if (rotation) {
-    double difference[9];
-    for (int i = 0; i < 9; i++) back[i] = f->turned[i % 3 * 3 + i / 3];
-    ep_multiply3(back, rotation, difference);
-    ep_rotation_log(difference, f->zeta);
+    difference_of(f->turned, rotation, f->zeta);
     memcpy(f->turned, rotation, sizeof f->turned);
   }
-  for (int i = 0; i < 9; i++) back[i] = state->frame.R[i % 3 * 3 + i / 3];
-  double whole[9];
-  ep_multiply3(back, f->turned, whole);
-  ep_rotation_log(whole, psi);
-  for (int i = 0; i < 3; i++) omega[i] = psi[i] / f->def->dt;
-  fill_coriolis(state->model, omega, state->free_c);
+  fill_mean_coriolis(f, state->free_c);
   memcpy(state->base, state->free_base, bytes);
   memcpy(state->aside, state->free_ahead, bytes);
-  turn(r, state->free_c, -f->def->dt, state->base, state->work, state->free_scratch);
-  turn(r, state->free_c, -f->def->dt, state->aside, state->work, state->free_scratch);
+  turn_both(f, state->free_c, state->base, state->aside);
   ep_rigid_sums(state->model, x, s, state->free_ds, state->free_h);
   ep_rigid_tensor(s, f->j);
   end_momentum(f, f->angular_ahead, f->torque, f->contact + 3, l);
@@ -417,16 +432,10 @@ void ep_free_finish(ep_free_step *f, const double *x, const ep_frame *found) {
   ep_state *state = f->state;
   const int r = state->model->size.r;
   if (f->def->integrator == EP_BDF2) { // the motion before, in the axes of the step's end
-    double back[9], whole[9], psi[3], omega[3];
-    for (int i = 0; i < 9; i++) back[i] = state->frame.R[i % 3 * 3 + i / 3];
-    ep_multiply3(back, f->turned, whole);
-    ep_rotation_log(whole, psi);
-    for (int i = 0; i < 3; i++) omega[i] = psi[i] / f->def->dt;
-    fill_coriolis(state->model, omega, state->free_n);
+    fill_mean_coriolis(f, state->free_n);
     memcpy(state->q_before, state->q, (size_t)r * sizeof *x);
     memcpy(state->v_before, state->free_p, (size_t)r * sizeof *x);
-    turn(r, state->free_n, -f->def->dt, state->q_before, state->work, state->free_scratch);
-    turn(r, state->free_n, -f->def->dt, state->v_before, state->work, state->free_scratch);
+    turn_both(f, state->free_n, state->q_before, state->v_before);
   }
   for (int a = 0; a < r; a++) {
     state->a[a] = f->inertia * (x[a] - state->aside[a]);

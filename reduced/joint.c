@@ -36,53 +36,73 @@ void ep_joint_take_iterate(ep_step_run *s, double *x) {
   memset(x + r + 3, 0, 3 * sizeof *x);
 }
 
-// Inertia of the rigid motion about the one free of contact, and how it goes with that of q:
-// inertia / 2 (m |c - c_ahead|^2 + |zeta + theta|_J^2) + inertia theta . H (x - x_frozen).
-double ep_joint_rigid(const ep_step_run *s, const double *x, double *g, double *h) {
+// Translation: energy, gradient added to g unless NULL.
+static double translation_energy(const ep_step_run *s, const double *x, double *g) {
   const ep_free_step *f = &s->motion;
-  const ep_state *state = s->state;
-  const int r = state->model->size.r, n = r + 6;
+  const int r = s->state->model->size.r;
   const double drag = s->def->damping_mass * s->rate;
-  double theta[3], body[3], z[3], jz[3], hd[3] = {0}, world[3], sum = 0;
+  double sum = 0;
   for (int i = 0; i < 3; i++) {
-    const double moved = x[r + i] / s->unit[0], c = state->frame.c[i] + moved;
+    const double moved = x[r + i] / s->unit[0], c = s->state->frame.c[i] + moved;
     const double ahead = c - f->c_ahead[i], base = c - f->c_base[i];
     sum += 0.5 * f->mass * (s->inertia * ahead * ahead + drag * base * base) - f->force[i] * moved;
     if (g) g[r + i] += (f->mass * (s->inertia * ahead + drag * base) - f->force[i]) / s->unit[0];
-    theta[i] = x[r + 3 + i] / s->unit[1];
   }
+  return sum;
+}
+
+// Rotation, and how it goes with q.
+static double rotation_energy(const ep_step_run *s, const double *x, double *g) {
+  const ep_free_step *f = &s->motion;
+  const ep_state *state = s->state;
+  const int r = state->model->size.r;
+  double theta[3], body[3], z[3], jz[3], hd[3] = {0}, world[3];
+  for (int i = 0; i < 3; i++) theta[i] = x[r + 3 + i] / s->unit[1];
   ep_rotate_back(s->iterate.R, theta, body);
   for (int i = 0; i < 3; i++) {
     z[i] = f->zeta[i] + body[i];
     for (int a = 0; a < r; a++) hd[i] += state->free_h[i * r + a] * (x[a] - state->free_at[a]);
   }
   ep_rotate(f->j, z, jz);
-  sum += s->inertia * ep_dot(3, body, hd) + 0.5 * f->turn_inertia * ep_dot(3, z, jz);
-  if (g) {
-    for (int a = 0; a < r; a++)
-      for (int i = 0; i < 3; i++) g[a] += s->inertia * body[i] * state->free_h[i * r + a];
-    for (int i = 0; i < 3; i++) hd[i] = s->inertia * hd[i] + f->turn_inertia * jz[i];
-    ep_rotate(s->iterate.R, hd, world);
-    for (int i = 0; i < 3; i++) g[r + 3 + i] += world[i] / s->unit[1];
-  }
-  if (!h) return sum;
+  const double coupling = s->inertia * ep_dot(3, body, hd);
+  const double turning = 0.5 * f->turn_inertia * ep_dot(3, z, jz);
+  if (!g) return coupling + turning;
+  for (int a = 0; a < r; a++)
+    for (int i = 0; i < 3; i++) g[a] += s->inertia * body[i] * state->free_h[i * r + a];
+  for (int i = 0; i < 3; i++) hd[i] = s->inertia * hd[i] + f->turn_inertia * jz[i];
+  ep_rotate(s->iterate.R, hd, world);
+  for (int i = 0; i < 3; i++) g[r + 3 + i] += world[i] / s->unit[1];
+  return coupling + turning;
+}
+
+static void rigid_hessian(const ep_step_run *s, double *h) {
+  const ep_free_step *f = &s->motion;
+  const int r = s->state->model->size.r, n = r + 6;
+  const double drag = s->def->damping_mass * s->rate;
   for (int i = 0; i < 3; i++) h[(r + i) * (n + 1)] += s->inertia + drag;
   for (int c = 0; c < 3; c++) { // column c of J R^T and of R
-    double column[3], unit[3] = {c == 0, c == 1, c == 2};
+    double column[3], jc[3], world[3], unit[3] = {c == 0, c == 1, c == 2};
     ep_rotate_back(s->iterate.R, unit, column);
-    ep_rotate(f->j, column, jz);
-    ep_rotate(s->iterate.R, jz, world);
+    ep_rotate(f->j, column, jc);
+    ep_rotate(s->iterate.R, jc, world);
     for (int i = 0; i < 3; i++)
       h[(r + 3 + i) * n + r + 3 + c] += f->turn_inertia * world[i] / (s->unit[1] * s->unit[1]);
     for (int a = 0; a < r; a++) {
       double coupling = 0;
-      for (int i = 0; i < 3; i++) coupling += column[i] * state->free_h[i * r + a];
+      for (int i = 0; i < 3; i++) coupling += column[i] * s->state->free_h[i * r + a];
       coupling *= s->inertia / s->unit[1];
       h[a * n + r + 3 + c] += coupling;
       h[(r + 3 + c) * n + a] += coupling;
     }
   }
-  return sum;
+}
+
+// Inertia of the rigid motion about the one free of contact, and how it goes with that of q:
+// inertia / 2 m |c - c_ahead|^2 + turn_inertia / 2 |zeta + theta|_J^2
+// + inertia theta . H (x - x_frozen).
+double ep_joint_rigid(const ep_step_run *s, const double *x, double *g, double *h) {
+  if (h) rigid_hessian(s, h);
+  return translation_energy(s, x, g) + rotation_energy(s, x, g);
 }
 
 // h (r x r) becomes the first rows and columns of an n x n matrix, zero elsewhere.
@@ -181,8 +201,8 @@ void ep_joint_begin(ep_step_run *s) {
   }
 }
 
-// An outer potential is a force like others to Newmark's formula; contact is not (contact.c): it is
-// taken off the acceleration that is kept.
+// An outer potential is a force like others to Newmark's formula; contact is not
+// (ep_contact_share): it is taken off the acceleration that is kept.
 int ep_joint_finish(ep_step_run *s) {
   ep_state *state = s->state;
   const int r = state->model->size.r, n = r + 6;

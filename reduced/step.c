@@ -204,7 +204,7 @@ static void choose_start(ep_step_run *s) {
   if (s->free) ep_free_freeze(&s->motion, state->x, NULL);
 }
 
-// Minimise; again where friction or the depth ask for it.
+// Minimise; again while friction asks for it.
 static ep_status minimise_contact(ep_step_run *s, ep_newton *newton) {
   for (;;) {
     const ep_status status = ep_newton_minimise(s->state, newton);
@@ -232,7 +232,7 @@ static ep_status minimise(ep_step_run *s, ep_newton *newton) {
   return minimise_contact(s, newton);
 }
 
-// The acceleration Newmark's formula goes on with is free of contact (reduced/contact.c); outer_g
+// The acceleration Newmark's formula goes on with is free of contact (ep_contact_share); outer_g
 // receives what is to be added to it.
 static void contact_gradient(ep_step_run *s) {
   ep_state *state = s->state;

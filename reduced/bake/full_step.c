@@ -262,7 +262,7 @@ static ep_status interpolate(ep_full_move *m, ep_error *err) {
   return ep_fail(err, status, "full-space step: the interpolation of the examples failed");
 }
 
-// Minimise; again where friction or the depth ask for it.
+// Minimise; again while friction asks for it.
 static ep_status minimise_all(ep_full_move *m, ep_error *err) {
   m->iterations = m->def->max_iterations;
   for (;;) {
@@ -273,27 +273,19 @@ static ep_status minimise_all(ep_full_move *m, ep_error *err) {
   }
 }
 
-// The acceleration Newmark's formula goes on with is free of contact.
-static ep_status take_contact_off(ep_full_move *m, ep_error *err) {
+// Acceleration by contact into `trial`: what Newmark's formula goes on with is free of it
+// (ep_contact_share).
+static ep_status contact_acceleration(ep_full_move *m, ep_error *err) {
   ep_full *full = m->full;
-  const size_t n3 = (size_t)full->n3;
-  memset(full->g, 0, n3 * sizeof *full->g);
+  memset(full->g, 0, (size_t)full->n3 * sizeof *full->g);
   ep_full_contact_energy(full->contact, m->def, full->x, full->g, NULL);
   ep_full_release_held(full, full->g);
   EP_TRY(ep_factor_update(full->factor, &full->mass, err));
-  EP_TRY(ep_factor_solve(full->factor, 1, full->g, full->trial, err));
-  ep_axpy(n3, 1, full->trial, full->a);
-  return EP_OK;
+  return ep_factor_solve(full->factor, 1, full->g, full->trial, err);
 }
 
-static ep_status finish_contact(ep_full_move *m, ep_error *err) {
-  ep_full_contact *contact = m->full->contact;
-  if (!ep_full_touches(m)) return EP_OK;
-  ep_full_contact_measure(contact, m->def, m->full->x, &m->report->contact);
-  return m->def->integrator == EP_NEWMARK ? take_contact_off(m, err) : EP_OK;
-}
-
-static void finish(ep_full_move *m) {
+// Nothing can fail any more.
+static void finish(ep_full_move *m, int contact_free) {
   ep_full *full = m->full;
   const size_t n3 = (size_t)full->n3, bytes = n3 * sizeof(double);
   memcpy(full->u_before, full->u, bytes);
@@ -302,6 +294,7 @@ static void finish(ep_full_move *m) {
     full->a[i] = m->inertia * (full->x[i] - full->ahead[i]);
     full->v[i] = m->rate * (full->x[i] - full->base[i]);
   }
+  if (contact_free) ep_axpy(n3, 1, full->trial, full->a);
   memcpy(full->u, full->x, bytes);
   memcpy(full->end_u, full->u, bytes);
   memcpy(full->end_v, full->v, bytes);
@@ -328,6 +321,9 @@ ep_status ep_full_step(ep_full *full, const ep_step_def *def, ep_full_report *re
     EP_TRY(ep_full_contact_create(full->fem, &full->contact, err));
   EP_TRY(predict(&m, err));
   EP_TRY(minimise_all(&m, err));
-  finish(&m);
-  return finish_contact(&m, err);
+  const int contact_free = ep_full_touches(&m) && def->integrator == EP_NEWMARK;
+  if (contact_free) EP_TRY(contact_acceleration(&m, err));
+  if (ep_full_touches(&m)) ep_full_contact_measure(full->contact, def, full->x, &report->contact);
+  finish(&m, contact_free);
+  return EP_OK;
 }

@@ -7,7 +7,8 @@
 
 // The potential minimised at strength w, with D the isotropic elasticity (lambda, mu):
 //   W(u) = sum_e V (lambda/2 tr(Z)^2 + mu Z : Z),  Z = E(u) - w E(P),  E = (F^T F - I) / 2
-// strain (nt x 9) holds E(P). The force g (3n) and the stiffness k (3x3-block pattern) may be NULL.
+// strain (nt x 9) holds E(P). Energy at u (3n) and force g (3n) unless NULL; stiffness into k
+// (3x3-block pattern).
 // project != 0: the Gauss-Newton part only, which is positive semidefinite.
 typedef struct ep_strain_fit {
   const ep_fem *fem;
