@@ -123,6 +123,11 @@ static ep_status run_steps(simulation *s, const ep_mesh *mesh, ep_log *log, ep_e
   ep_progress_end(log);
   free(x);
   if (status == EP_OK) return EP_OK;
+  if (status != EP_ERR_NUMERIC)
+    return ep_fail(err, status,
+                   "step %d: the run time cannot do what the scene asks for; this should have been "
+                   "refused before: please report it with the scene",
+                   s->record->rows);
   return ep_fail(err, status,
                  "step %d (t = %.4g s) failed even at 1/%d of the time step; weaken the loads, "
                  "take a smaller simulation.dt or more damping. What was simulated is kept",

@@ -179,6 +179,7 @@ static void apply_variant(ep_stress_variant v, ep_scene *scene) {
     break;
   case EP_VARIANT_CUBIC:
     scene->evaluator = EP_EVALUATE_CUBIC;
+    if (ep_scene_local(scene)) scene->relief = 0; // polynomials know no part of the object
     break;
   case EP_VARIANT_LB:
   case EP_VARIANT_GREEN:

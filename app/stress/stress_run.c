@@ -100,6 +100,8 @@ static ep_status one_step(run *w, int step, bool *go_on, ep_error *err) {
   EP_TRY(remember(w, t, loaded, err));
   const ep_status status = ep_stepper_advance(w->bench.stepper, t, dt, loaded, &done);
   *go_on = status == EP_OK;
+  if (status != EP_OK && status != EP_ERR_NUMERIC)
+    return ep_fail(err, status, "step %d: the run time cannot do what this case asks for", step);
   if (status != EP_OK) {
     char why[128];
     out->failed_step = step;
@@ -160,7 +162,8 @@ ep_status ep_stress_run(const ep_session *base, const ep_stress_case *c, ep_stre
   free(w);
   if (status == EP_OK) return EP_OK;
   if (status == EP_ERR_MEMORY || status == EP_ERR_IO) return ep_fail(err, status, "%s", here.text);
-  worse(out, EP_STRESS_REFUSED, here.text);
+  // what the run time takes for a wrong use of it is ours to mend, not the case's to be refused
+  worse(out, status == EP_ERR_ARGUMENT ? EP_STRESS_BROKEN : EP_STRESS_REFUSED, here.text);
   return EP_OK;
 }
 
