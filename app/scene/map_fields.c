@@ -159,6 +159,7 @@ ep_status ep_map_fields(const ep_scene *scene, const ep_shapes *shapes, int fami
     if (optional && !ep_mesh_data(p.mesh[1], p.name[1])) continue;
     status = add_field(&p, out, err);
   }
-  if (status != EP_OK) ep_map_fields_free(out);
-  return status;
+  if (status == EP_OK) return EP_OK;
+  ep_map_fields_free(out);
+  return ep_fail_context(err, "%s", scene->path);
 }

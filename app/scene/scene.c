@@ -101,66 +101,6 @@ static ep_status read_simulation(const ep_scene_reader *r, const raw_simulation 
                         &out->damping_stiffness);
 }
 
-static ep_status read_push(const ep_scene_reader *r, const char *key, const raw_push *raw,
-                           ep_load *out) {
-  char part[96];
-  const raw_selection where = {raw->box,   raw->plane, raw->file,
-                               raw->field, raw->above, raw->equals};
-  EP_TRY(ep_read_selection(r, key, &where, &out->where));
-  snprintf(part, sizeof part, "%s.force", key);
-  EP_TRY(ep_read_vector(r, part, raw->force, out->vector));
-  snprintf(part, sizeof part, "%s.from", key);
-  EP_TRY(ep_read_number(r, part, raw->from, 0, 0, 1e9, &out->from));
-  snprintf(part, sizeof part, "%s.until", key);
-  EP_TRY(ep_read_number(r, part, raw->until, 1e9, 0, 1e9, &out->until));
-  if (out->until <= out->from)
-    return ep_read_refuse(r, part, "the push ends at %g s, before it begins at %g s", out->until,
-                          out->from);
-  snprintf(part, sizeof part, "%s.ramp", key);
-  EP_TRY(ep_read_number(r, part, raw->ramp, 0, 0, 1e9, &out->ramp));
-  if (2 * out->ramp > out->until - out->from)
-    return ep_read_refuse(r, part, "rise and fall of %g s each do not fit between %g and %g s",
-                          out->ramp, out->from, out->until);
-  return EP_OK;
-}
-
-static ep_status read_loads(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out) {
-  if (!raw->loads_count) return EP_OK;
-  out->load = calloc(raw->loads_count, sizeof *out->load);
-  out->drag = calloc(raw->loads_count, sizeof *out->drag);
-  out->pressure = calloc(raw->loads_count, sizeof *out->pressure);
-  if (!out->load || !out->drag || !out->pressure) return ep_read_no_memory(r);
-  for (unsigned i = 0; i < raw->loads_count; i++) {
-    const raw_load *given = &raw->loads[i];
-    ep_load *load = &out->load[out->nloads];
-    char key[64];
-    snprintf(key, sizeof key, "loads.%u", i);
-    if ((given->gravity != NULL) + (given->push != NULL) + (given->drag != NULL) +
-            (given->pressure != NULL) !=
-        1)
-      return ep_read_refuse(r, key, "give one of gravity, push, drag, pressure");
-    if (given->pressure) {
-      snprintf(key, sizeof key, "loads.%u.pressure", i);
-      EP_TRY(ep_read_pressure(r, key, given->pressure, &out->pressure[out->npressures++]));
-      continue;
-    }
-    if (given->drag) {
-      snprintf(key, sizeof key, "loads.%u.drag", i);
-      EP_TRY(ep_read_drag(r, key, given->drag, &out->drag[out->ndrags++]));
-      continue;
-    }
-    out->nloads++;
-    load->gravity = given->gravity != NULL;
-    if (load->gravity) {
-      EP_TRY(ep_read_vector(r, key, given->gravity, load->vector));
-    } else {
-      snprintf(key, sizeof key, "loads.%u.push", i);
-      EP_TRY(read_push(r, key, given->push, load));
-    }
-  }
-  return EP_OK;
-}
-
 ep_status ep_read_green(const ep_scene_reader *r, const raw_examples *raw, ep_green *out) {
   const raw_constraints none = {0};
   const raw_constraints *weak = raw && raw->constraints ? raw->constraints : &none;
@@ -237,7 +177,7 @@ static ep_status convert(const ep_scene_reader *r, const raw_scene *raw, ep_scen
   EP_TRY(ep_read_families(r, raw, out));
   EP_TRY(read_reduction(r, raw->reduction, out));
   EP_TRY(read_simulation(r, raw->simulation, out));
-  EP_TRY(read_loads(r, raw, out));
+  EP_TRY(ep_read_loads(r, raw, out));
   EP_TRY(ep_read_contact(r, raw, out));
   EP_TRY(read_examples(r, raw->examples, out));
   EP_TRY(read_output(r, raw->output, out));

@@ -1,4 +1,4 @@
-// Obstacles of a scene, their motion, how contact works; what drags the object along a path.
+// Obstacles of a scene, their motion, how contact works.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -142,57 +142,5 @@ ep_status ep_read_contact(const ep_scene_reader *r, const raw_scene *raw, ep_sce
     out->nobstacles++;
     EP_TRY(read_obstacle(r, i, &raw->obstacles[i], friction, &out->obstacle[i]));
   }
-  return EP_OK;
-}
-
-ep_status ep_read_drag(const ep_scene_reader *r, const char *key, const raw_drag *raw,
-                       ep_scene_drag *out) {
-  char part[112];
-  const raw_selection where = {.box = raw->box, .plane = raw->plane, .file = raw->file};
-  EP_TRY(ep_read_selection(r, key, &where, &out->where));
-  out->path.smooth = raw->smooth && *raw->smooth;
-  out->path.key = calloc(raw->path_count, sizeof *out->path.key);
-  if (!out->path.key) return ep_read_no_memory(r);
-  for (unsigned i = 0; i < raw->path_count; i++) {
-    ep_keyframe *k = &out->path.key[out->path.keys++];
-    snprintf(part, sizeof part, "%.80s.path.%u.time", key, i);
-    EP_TRY(ep_read_number(r, part, &raw->path[i].time, 0, 0, 1e9, &k->time));
-    if (i > 0 && k->time <= k[-1].time)
-      return ep_read_refuse(r, part, "%g s does not come after %g s; order the path by time",
-                            k->time, k[-1].time);
-    snprintf(part, sizeof part, "%.80s.path.%u.at", key, i);
-    EP_TRY(ep_read_vector(r, part, raw->path[i].at, k->move));
-  }
-  snprintf(part, sizeof part, "%.80s.stiffness", key);
-  EP_TRY(ep_read_number(r, part, &raw->stiffness, 0, 1e-9, 1e12, &out->stiffness));
-  snprintf(part, sizeof part, "%.80s.damping", key);
-  EP_TRY(ep_read_number(r, part, raw->damping, 0, 0, 1e12, &out->damping));
-  snprintf(part, sizeof part, "%.80s.from", key);
-  EP_TRY(ep_read_number(r, part, raw->from, 0, 0, 1e9, &out->from));
-  snprintf(part, sizeof part, "%.80s.until", key);
-  EP_TRY(ep_read_number(r, part, raw->until, 1e9, 0, 1e9, &out->until));
-  if (out->until <= out->from)
-    return ep_read_refuse(r, part, "the drag ends at %g s, before it begins at %g s", out->until,
-                          out->from);
-  return EP_OK;
-}
-
-ep_status ep_read_pressure(const ep_scene_reader *r, const char *key, const raw_pressure *raw,
-                           ep_scene_pressure *out) {
-  char part[112];
-  const raw_selection where = {.box = raw->box, .plane = raw->plane, .file = raw->file};
-  out->selected = raw->box || raw->plane || raw->file;
-  if (out->selected) EP_TRY(ep_read_selection(r, key, &where, &out->where));
-  snprintf(part, sizeof part, "%.80s.pascal", key);
-  EP_TRY(ep_read_number(r, part, &raw->pascal, 0, -1e12, 1e12, &out->pascal));
-  snprintf(part, sizeof part, "%.80s.from", key);
-  EP_TRY(ep_read_number(r, part, raw->from, 0, 0, 1e9, &out->from));
-  snprintf(part, sizeof part, "%.80s.until", key);
-  EP_TRY(ep_read_number(r, part, raw->until, 1e9, 0, 1e9, &out->until));
-  snprintf(part, sizeof part, "%.80s.ramp", key);
-  EP_TRY(ep_read_number(r, part, raw->ramp, 0, 0, 1e9, &out->ramp));
-  if (out->until <= out->from || 2 * out->ramp > out->until - out->from)
-    return ep_read_refuse(r, part, "rise and fall of %g s each do not fit between %g and %g s",
-                          out->ramp, out->from, out->until);
   return EP_OK;
 }

@@ -5,9 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "app/scene/schema_walk.h"
+
 // What libcyaml says about a failure: the cause, then a backtrace from the innermost field.
 typedef struct complaint {
-  char cause[256], field[128];
+  char cause[256], field[128], outer[128]; // outer: the field around `field`
   int line, column;
 } complaint;
 
@@ -29,7 +31,8 @@ static void listen(cyaml_log_t level, void *user, const char *format, va_list ar
       heard->line = line;
       heard->column = column;
     }
-    if (!heard->field[0]) sscanf(message, "  in mapping field '%127[^']'", heard->field);
+    char *to = heard->field[0] ? heard->outer : heard->field;
+    if (!*to) sscanf(message, "  in mapping field '%127[^']'", to);
   } else if (!heard->cause[0] && strncmp(message, "Load: ", 6) == 0) {
     snprintf(heard->cause, sizeof heard->cause, "%s", message + 6);
   }
@@ -40,10 +43,26 @@ static cyaml_config_t configuration(complaint *heard) {
       .log_fn = listen, .log_ctx = heard, .mem_fn = cyaml_mem, .log_level = CYAML_LOG_WARNING};
 }
 
+static ep_status say_unknown(const char *where, const char *within, const char *key,
+                             ep_error *err) {
+  char meant[200];
+  const bool near = ep_schema_nearest(within, key, meant, sizeof meant);
+  return ep_fail(err, EP_ERR_SCENE, "%s: unknown key '%s'%s%s; docs/scene.md lists the keys", where,
+                 key, near ? "; is it meant to be " : "", near ? meant : "");
+}
+
+// The innermost field is then the one that was read last, the next one lacks the key.
+static ep_status say_missing(const char *where, const complaint *heard, const char *key,
+                             ep_error *err) {
+  return ep_fail(err, EP_ERR_SCENE, "%s: %s%s%s is missing", where, heard->outer,
+                 heard->outer[0] ? "." : "", key);
+}
+
 // libcyaml gives the place of the value before an unexpected key: find the key itself.
 static ep_status say(ep_yaml *yaml, complaint *heard, cyaml_err_t code, bool overridden,
                      ep_error *err) {
   static const char unexpected[] = "Unexpected key: ";
+  static const char missing[] = "Missing required mapping field: ";
   char where[512] = "";
   const bool unknown = strncmp(heard->cause, unexpected, sizeof unexpected - 1) == 0;
   if (unknown) {
@@ -58,11 +77,11 @@ static ep_status say(ep_yaml *yaml, complaint *heard, cyaml_err_t code, bool ove
     snprintf(where, sizeof where, "%s with --set", yaml->name);
   else
     snprintf(where, sizeof where, "%s:%d:%d", yaml->name, heard->line, heard->column);
-  if (unknown)
-    return ep_fail(err, EP_ERR_SCENE, "%s: unknown key '%s'; docs/scene.md lists the keys", where,
-                   heard->cause + sizeof unexpected - 1);
+  if (unknown) return say_unknown(where, heard->field, heard->cause + sizeof unexpected - 1, err);
+  if (strncmp(heard->cause, missing, sizeof missing - 1) == 0)
+    return say_missing(where, heard, heard->cause + sizeof missing - 1, err);
   if (!heard->cause[0]) snprintf(heard->cause, sizeof heard->cause, "%s", cyaml_strerror(code));
-  const bool named = heard->field[0] && !strstr(heard->cause, "Missing");
+  const bool named = heard->field[0];
   return ep_fail(err, EP_ERR_SCENE, "%s: %s%s%s%s", where, named ? "'" : "",
                  named ? heard->field : "", named ? "': " : "", heard->cause);
 }
@@ -91,6 +110,7 @@ static ep_status fit_with_sets(ep_scene_text *out, int nsets, const char *const 
   EP_TRY(ep_yaml_parse(out->yaml.name, text, size, &merged, err));
   ep_status status = EP_OK;
   for (int i = 0; i < nsets && status == EP_OK; i++) status = ep_yaml_set(&merged, sets[i], err);
+  if (status == EP_OK) status = ep_schema_check_values(&merged, true, err);
   char *printed = NULL;
   size_t length = 0;
   if (status == EP_OK) status = ep_yaml_print(&merged, &printed, &length, err);
@@ -106,6 +126,7 @@ ep_status ep_scene_load(const char *name, const char *text, size_t size, int nse
   EP_TRY(ep_yaml_parse(name, text, size, &out->yaml, err));
   // The file alone first, so that its own mistakes are reported with their line.
   ep_status status = fit(&out->yaml, text, size, false, nsets ? NULL : &out->raw, err);
+  if (status == EP_OK) status = ep_schema_check_values(&out->yaml, false, err);
   if (status == EP_OK && nsets) status = fit_with_sets(out, nsets, sets, text, size, err);
   if (status != EP_OK) ep_scene_unload(out);
   return status;

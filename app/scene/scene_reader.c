@@ -71,11 +71,21 @@ static ep_status field_selection(const ep_scene_reader *r, const char *key,
   return ep_read_text(r, raw->field, &out->path);
 }
 
+// Whether anything lies there shows when the mesh is read: the place is kept for that message. The
+// end of a long path says more than its beginning.
+static void set_place(const ep_scene_reader *r, const char *key, ep_selection *out) {
+  const size_t length = strlen(r->name), most = 90;
+  int line, column;
+  ep_yaml_locate(&r->loaded->yaml, key, &line, &column);
+  snprintf(out->key, sizeof out->key, "%s%.90s:%d:%d: %.60s", length > most ? "..." : "",
+           r->name + (length > most ? length - most : 0), line, column, key);
+}
+
 ep_status ep_read_selection(const ep_scene_reader *r, const char *key, const raw_selection *raw,
                             ep_selection *out) {
   const raw_box *box = raw->box;
   const raw_plane *plane = raw->plane;
-  snprintf(out->key, sizeof out->key, "%s", key);
+  set_place(r, key, out);
   if (!!box + !!plane + !!raw->file + !!raw->field != 1)
     return ep_read_refuse(r, key, "give one of box, plane, file, field");
   if (raw->field) return field_selection(r, key, raw, out);

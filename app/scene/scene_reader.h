@@ -46,10 +46,7 @@ ep_status ep_read_families(const ep_scene_reader *r, const raw_scene *raw, ep_sc
 ep_status ep_read_contact(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out);
 // After fixed: only free objects start in motion.
 ep_status ep_read_start(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out);
-ep_status ep_read_drag(const ep_scene_reader *r, const char *key, const raw_drag *raw,
-                       ep_scene_drag *out);
-ep_status ep_read_pressure(const ep_scene_reader *r, const char *key, const raw_pressure *raw,
-                           ep_scene_pressure *out);
+ep_status ep_read_loads(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out);
 // raw NULL: no turn.
 ep_status ep_read_turn(const ep_scene_reader *r, const char *key, const raw_turn *raw,
                        ep_turn *out);

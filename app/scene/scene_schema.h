@@ -100,7 +100,8 @@ typedef struct raw_waypoint {
 typedef struct raw_drag {
   raw_box *box;
   raw_plane *plane;
-  char *file;
+  char *file, *field;
+  double *above, *equals;
   raw_waypoint *path;
   unsigned path_count;
   double stiffness, *damping, *from, *until;
@@ -109,7 +110,8 @@ typedef struct raw_drag {
 typedef struct raw_pressure {
   raw_box *box;
   raw_plane *plane;
-  char *file;
+  char *file, *field;
+  double *above, *equals;
   double pascal, *from, *until, *ramp;
 } raw_pressure;
 typedef struct raw_load {

@@ -6,8 +6,11 @@
 
 enum { KEY_MAX = 256, DEPTH_MAX = 32, CHUNK = 4096 };
 
-static ep_status syntax_error(const yaml_parser_t *parser, const char *name, ep_error *err) {
+static ep_status syntax_error(const yaml_parser_t *parser, const char *name, const char *text,
+                              size_t size, ep_error *err) {
   const char *problem = parser->problem ? parser->problem : "not YAML";
+  const size_t at = parser->problem_mark.index;
+  if (at < size && text[at] == '\t') problem = "a tab: YAML is indented by blanks";
   return ep_fail(err, EP_ERR_SCENE, "%s:%zu:%zu: %s", name, parser->problem_mark.line + 1,
                  parser->problem_mark.column + 1, problem);
 }
@@ -21,11 +24,11 @@ static ep_status load_one(const char *name, const char *text, size_t size,
   yaml_parser_set_input_string(&parser, (const unsigned char *)text, size);
   ep_status status = EP_OK;
   if (!yaml_parser_load(&parser, document)) {
-    status = syntax_error(&parser, name, err);
+    status = syntax_error(&parser, name, text, size, err);
   } else {
     yaml_document_t second;
     if (!yaml_parser_load(&parser, &second)) {
-      status = syntax_error(&parser, name, err);
+      status = syntax_error(&parser, name, text, size, err);
     } else {
       if (yaml_document_get_root_node(&second))
         status =

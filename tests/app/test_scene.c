@@ -1,6 +1,7 @@
 // Claims: a scene is read with its defaults; everything docs/scene.md does not allow is refused
-// with the place (line:column) and the key; --set is checked like the file; selections hold exactly
-// the vertices geometry says.
+// with the place (line:column) and the key, numbers with something behind them too, and the key
+// that was meant is said; --set is checked like the file; selections hold exactly the vertices
+// geometry says.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -178,6 +179,46 @@ static void mistakes_are_named_with_their_place(void **state) {
   refused("schema: 1\nobject: {mesh: box.veg, material: {young: 1e5}}\n", "s.yaml:2", "all of");
 }
 
+// libcyaml reads "3e5 Pa" as 3e5 and "flase" as true.
+static void values_are_read_to_their_end(void **state) {
+  (void)state;
+  ep_scene s;
+  ep_error err;
+#define YOUNG(text)                                                                                \
+  "schema: 1\nobject: {mesh: box.veg, material: {density: 1, young: " text ", poisson: 0}}\n"
+  static const char *const numbers[] = {YOUNG("3e5 Pa"), YOUNG("3e5Pa"), YOUNG("300_000"),
+                                        YOUNG("'1,5'"), YOUNG("1.2.3")};
+  for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+    refused(numbers[i], "s.yaml:2:55: young", "no number");
+  refused(HEAD "loads: [{gravity: [0, 9.81m, 0]}]\n", "s.yaml:3:", "'9.81m'");
+  refused(HEAD "families: [{poses: [box.veg], map: {landmarks: [{object: 3, poses: [4x]}]}}]\n",
+          "s.yaml:3:69: poses", "'4x'");
+  refused(HEAD "families: [{poses: [box.veg], map: {accept: flase}}]\n", "s.yaml:3:45: accept",
+          "'flase' is neither");
+  refused(HEAD "families: [{poses: [box.veg], map: {accept: off}}]\n", "s.yaml:3:45", "neither");
+  assert_int_equal(
+      parse_with(HEAD "families: [{poses: [box.veg], map: {accept: No}}]\n", 0, NULL, &s, &err),
+      EP_OK);
+  assert_false(s.family[0].accept);
+  ep_scene_free(&s);
+  const char *set = "simulation.steps=12 s";
+  assert_int_equal(parse_with(HEAD, 1, &set, &s, &err), EP_ERR_SCENE);
+  assert_non_null(strstr(err.text, "with --set: steps: '12 s'"));
+}
+
+static void what_was_meant_is_said(void **state) {
+  (void)state;
+  refused(HEAD "reduction: {mods: 3}\n", "s.yaml:3:13", "meant to be reduction.modes;");
+  refused(HEAD "modes: 3\n", "s.yaml:3:1", "meant to be reduction.modes;"); // at the wrong place
+  refused(HEAD "examples: {strengh: 3}\n", "s.yaml:3", "meant to be examples.strength;");
+  refused(HEAD "fixed: [{boxx: 1}]\n", "s.yaml:3", "meant to be fixed[].box;");
+  refused(HEAD "famliies: []\n", "s.yaml:3:1", "meant to be families;");  // letters exchanged
+  refused(HEAD "colour: red\n", "s.yaml:3:1", "'colour'; docs/scene.md"); // nothing is near
+  refused("schema: 1\nobject: {}\n", "s.yaml:2", "object.mesh is missing");
+  refused("object: {mesh: box.veg}\n", "s.yaml", ": schema is missing");
+  refused("schema: 1\nobject:\n\tmesh: box.veg\n", "s.yaml:3:1", "a tab");
+}
+
 static void overrides_are_checked_like_the_file(void **state) {
   (void)state;
   ep_scene s;
@@ -218,6 +259,44 @@ static void selections_hold_what_geometry_says(void **state) {
   ep_mesh_free(&mesh);
 }
 
+// Found when the mesh is read, and still told with its place in the scene.
+static void empty_selections_tell_their_place(void **state) {
+  (void)state;
+  ep_scene s;
+  ep_mesh mesh;
+  ep_error err;
+  int count, *vertex;
+  assert_int_equal(
+      parse_with(HEAD "fixed:\n  - box: {low: [9, 9, 9], high: [10, 10, 10]}\n", 0, NULL, &s, &err),
+      EP_OK);
+  assert_int_equal(ep_mesh_read("box.veg", &mesh, NULL, NULL, &err), EP_OK);
+  assert_int_equal(ep_select_fixed(&s, &mesh, &count, &vertex, &err), EP_ERR_SCENE);
+  assert_non_null(strstr(err.text, "s.yaml:4:5: fixed.0: no vertex of box.veg lies there"));
+  ep_mesh_free(&mesh);
+  ep_scene_free(&s);
+}
+
+// Every load that chooses vertices can do so by a field.
+static void loads_choose_by_fields(void **state) {
+  (void)state;
+  ep_scene s;
+  ep_error err;
+  if (parse_with(HEAD "loads:\n  - push: {field: a, force: [0, 0, 1]}\n"
+                      "  - pressure: {field: b, equals: 2, pascal: 10}\n"
+                      "  - drag: {field: c, above: 0.1, path: [{time: 0, at: [0, 0, 0]}],\n"
+                      "           stiffness: 1}\n",
+                 0, NULL, &s, &err) != EP_OK)
+    fail_msg("%s", err.text);
+  assert_int_equal(s.load[0].where.kind, EP_SELECT_FIELD);
+  assert_true(s.load[0].where.value == 0.5 && !s.load[0].where.equals);
+  assert_true(s.pressure[0].selected && s.pressure[0].where.equals);
+  assert_true(s.pressure[0].where.value == 2);
+  assert_int_equal(s.drag[0].where.kind, EP_SELECT_FIELD);
+  assert_true(s.drag[0].where.value == 0.1);
+  ep_scene_free(&s);
+  refused(HEAD "loads: [{pressure: {equals: 2, pascal: 10}}]\n", "s.yaml:3", "one of box");
+}
+
 static void vertex_lists_are_checked(void **state) {
   (void)state;
   ep_mesh mesh;
@@ -251,8 +330,12 @@ int main(void) {
       cmocka_unit_test(everything_is_read),
       cmocka_unit_test(json_is_a_scene_too),
       cmocka_unit_test(mistakes_are_named_with_their_place),
+      cmocka_unit_test(values_are_read_to_their_end),
+      cmocka_unit_test(what_was_meant_is_said),
       cmocka_unit_test(overrides_are_checked_like_the_file),
       cmocka_unit_test(selections_hold_what_geometry_says),
+      cmocka_unit_test(empty_selections_tell_their_place),
+      cmocka_unit_test(loads_choose_by_fields),
       cmocka_unit_test(vertex_lists_are_checked),
   };
   return cmocka_run_group_tests(tests, set_up, NULL);
