@@ -62,6 +62,8 @@ ep_status ep_bake_compute(ep_bake *bake, ep_bake_step *step, ep_error *err) {
 
 ep_status ep_bake_status(const ep_stage *stage, ep_status status, ep_error *err) {
   if (status == EP_OK || strncmp(err->text, "stage ", 6) == 0) return status;
+  // what a stage does not accept was asked for by the scene, not on the command line
+  if (err->status == EP_ERR_ARGUMENT) err->status = EP_ERR_SCENE;
   return ep_fail_context(err, "stage %s", stage->name);
 }
 

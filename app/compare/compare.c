@@ -269,7 +269,8 @@ static ep_status compute_point(sweep *w, ep_bench *bench, const ep_digest *key, 
   ep_frames_free(&frames);
   if (status == EP_OK) return store_point(w, key, p, err);
   // A setting that cannot be run is a result too; what a later try may cure is not.
-  if (status != EP_ERR_NUMERIC && status != EP_ERR_UNSUPPORTED && status != EP_ERR_ARGUMENT)
+  if (status != EP_ERR_NUMERIC && status != EP_ERR_UNSUPPORTED && status != EP_ERR_ARGUMENT &&
+      status != EP_ERR_SCENE)
     return ep_fail(err, status, "%s", here.text);
   p->failed = true;
   snprintf(p->why, sizeof p->why, "%.255s", here.text);
