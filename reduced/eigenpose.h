@@ -92,9 +92,9 @@ const char *ep_state_isa(const ep_state *state); // kernels in use: "baseline", 
 // Use these kernels instead of the widest the processor runs; all give the same bits. Errors:
 // EP_ERR_UNSUPPORTED (not on this processor), EP_ERR_ARGUMENT (no such name): nothing is changed.
 ep_status ep_state_use_isa(ep_state *state, const char *name);
-ep_status ep_isa_check(const char *name); // would it take this name?
-double *ep_state_q(ep_state *state);             // (r) reduced coordinates, may be written
-double *ep_state_velocity(ep_state *state);      // (r) may be written
+ep_status ep_isa_check(const char *name);              // would it take this name?
+double *ep_state_q(ep_state *state);                   // (r) reduced coordinates, may be written
+double *ep_state_velocity(ep_state *state);            // (r) may be written
 const double *ep_state_weights(const ep_state *state); // (k) example weights of the last step
 // (regions x r) target configurations of the last step, regions = ep_model_regions.
 const double *ep_state_target(const ep_state *state);
@@ -146,8 +146,8 @@ ep_status ep_example_weights(ep_state *state, const double *c, double *w);
 // How the target configuration is found: NULL for the built-in Newton, or another solver (NLopt in
 // the offline part). Minimise ep_target_energy from q (r, in: warm start, out: minimum).
 typedef struct ep_target_report {
-  int evaluations, iterations;
-  double relative_gradient; // |K0^-1/2 grad| over that of the start or the scale of the problem
+  int evaluations, iterations; // of all regions and rounds (reduced/target.c)
+  double relative_gradient;    // ep_target_residual at the end, the largest of all regions
 } ep_target_report;
 typedef ep_status (*ep_target_solver)(void *user, ep_state *state, const double *w, double *q,
                                       double tolerance, ep_target_report *report);
@@ -240,7 +240,8 @@ typedef struct ep_step_def {
   ep_contact_def contact;
 } ep_step_def;
 ep_step_def ep_default_step(void);
-// 1 where ep_step accepts it: made by ep_default_step, every number finite and in range.
+// 1 where ep_step accepts it for some model: made by ep_default_step, every number in range and
+// finite (those of `force` and `modes` are not looked at: they show in the energy).
 int ep_step_def_valid(const ep_step_def *def);
 
 typedef struct ep_contact_report {

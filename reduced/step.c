@@ -32,7 +32,8 @@ int ep_step_def_valid(const ep_step_def *d) {
   return d->cookie == COOKIE && d->dt > 0 && isfinite(d->dt) && d->damping_mass >= 0 &&
          isfinite(d->damping_mass) && d->damping_stiffness >= 0 && isfinite(d->damping_stiffness) &&
          d->strength >= 0 && isfinite(d->strength) && d->relief >= 0 && d->relief <= 1 &&
-         d->tolerance > 0 && d->target_tolerance > 0 && d->max_iterations > 0 && finite_pulls(d) &&
+         d->tolerance > 0 && isfinite(d->tolerance) && d->target_tolerance > 0 &&
+         isfinite(d->target_tolerance) && d->max_iterations > 0 && finite_pulls(d) &&
          ep_contact_def_valid(d) && ep_green_valid(&d->green) &&
          ep_integrator_name(d->integrator) != NULL &&
          (d->example_force == EP_EXAMPLE_ENERGY || d->example_force == EP_EXAMPLE_LINEAR);
