@@ -18,6 +18,7 @@
 #include "reduced/contact_point.h"
 #include "reduced/state.h"
 #include "tests/reduced/bar_contact.h"
+#include "tests/reduced/count_allocations.h"
 
 enum { R = 8, N = R + 6 };
 
@@ -290,21 +291,6 @@ static void penalty_is_smooth(void **unused) {
   }
   double slope, bend;
   assert_true(ep_contact_penalty(&law, 0, &slope, &bend) == 0 && slope == 0 && bend == 0);
-}
-
-// Steps inside contact take no memory: see the linker's --wrap in CMakeLists.txt.
-static volatile int allocations;
-void *__real_malloc(size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_malloc(size_t size) {
-  allocations++;
-  return __real_malloc(size);
-}
-void *__real_calloc(size_t n, size_t size);
-void *__wrap_calloc(size_t n, size_t size);
-void *__wrap_calloc(size_t n, size_t size) {
-  allocations++;
-  return __real_calloc(n, size);
 }
 
 static void steps_take_no_memory(void **unused) {

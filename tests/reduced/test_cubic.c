@@ -15,27 +15,9 @@
 #include "reduced/cubic_kernel.h"
 #include "tests/reduced/bar.h"
 #include "tests/reduced/quartic.h"
+#include "tests/reduced/vectors.h"
 
 enum { R = 32, STATES = 37 };
-
-static double norm(int n, const double *a) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += a[i] * a[i];
-  return sqrt(sum);
-}
-
-static double distance(int n, const double *a, const double *b) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += (a[i] - b[i]) * (a[i] - b[i]);
-  return sqrt(sum);
-}
-
-static void *block_of(size_t bytes) {
-  void *block = aligned_alloc(64, (bytes + 63) / 64 * 64);
-  assert_non_null(block);
-  memset(block, 0xff, bytes); // not numbers: whoever reads what nobody wrote shows it
-  return block;
-}
 
 typedef struct form {
   bar *b;

@@ -13,6 +13,7 @@
 
 #include "tests/reduced/bar.h"
 #include "tests/reduced/quartic.h"
+#include "tests/reduced/vectors.h"
 
 enum { R = 20, STEPS = 1000 };
 
@@ -22,24 +23,6 @@ typedef struct subject {
   double *packed, *stream, scales[3];
   float *narrow;
 } subject;
-
-static double norm(int n, const double *a) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += a[i] * a[i];
-  return sqrt(sum);
-}
-
-static double distance(int n, const double *a, const double *b) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += (a[i] - b[i]) * (a[i] - b[i]);
-  return sqrt(sum);
-}
-
-static void *block_of(size_t bytes) {
-  void *block = aligned_alloc(64, (bytes + 63) / 64 * 64);
-  assert_non_null(block);
-  return block;
-}
 
 static void set_up(subject *x, ep_material material, int examples) {
   x->b = bar_create(6, 2, 1, R, 0, examples ? 6 : 0, examples, material);

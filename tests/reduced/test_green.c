@@ -15,6 +15,7 @@
 
 #include "reduced/green.h"
 #include "tests/reduced/bar.h"
+#include "tests/reduced/vectors.h"
 
 enum { R = 20, K = 3 };
 
@@ -43,12 +44,6 @@ static double total(scene *c, const ep_green *green, const double *q, double *f,
   for (int i = 0; f && i < R; i++) f[i] += green->alpha * gf[i];
   for (int i = 0; h && i < R * R; i++) h[i] += green->alpha * gh[i];
   return w + green->alpha * a;
-}
-
-static double norm(int n, const double *x) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += x[i] * x[i];
-  return sqrt(sum);
 }
 
 // Errors of central differences of energy and gradient along d with step t.

@@ -14,18 +14,7 @@
 
 #include "reduced/kernel.h"
 #include "tests/reduced/bar.h"
-
-static double norm(int n, const double *a) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += a[i] * a[i];
-  return sqrt(sum);
-}
-
-static double distance(int n, const double *a, const double *b) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += (a[i] - b[i]) * (a[i] - b[i]);
-  return sqrt(sum);
-}
+#include "tests/reduced/vectors.h"
 
 enum { R = 32 }; // room for the largest r used here
 

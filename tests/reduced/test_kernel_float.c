@@ -16,20 +16,9 @@
 #include "reduced/kernel.h"
 #include "reduced/state.h"
 #include "tests/reduced/bar.h"
+#include "tests/reduced/vectors.h"
 
 enum { R = 40 };
-
-static double norm(int n, const double *a) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += a[i] * a[i];
-  return sqrt(sum);
-}
-
-static double distance(int n, const double *a, const double *b) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += (a[i] - b[i]) * (a[i] - b[i]);
-  return sqrt(sum);
-}
 
 typedef struct subject {
   bar *b;
@@ -39,12 +28,6 @@ typedef struct subject {
   void *blocks[3];
   ep_state *in_floats, *in_doubles, *exact;
 } subject;
-
-static void *block_of(size_t bytes) {
-  void *block = aligned_alloc(64, (bytes + 63) / 64 * 64);
-  assert_non_null(block);
-  return block;
-}
 
 static ep_state *state_of(const ep_model *model, void **block) {
   ep_state *state = NULL;

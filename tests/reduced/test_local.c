@@ -15,16 +15,9 @@
 #include <cmocka.h>
 
 #include "tests/reduced/bar.h"
+#include "tests/reduced/count_allocations.h"
 
 enum { R = 16, M = 6, K = 3, S = 40 };
-
-static volatile int allocations;
-void *__real_malloc(size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_malloc(size_t size) {
-  allocations++;
-  return __real_malloc(size);
-}
 
 typedef struct local {
   bar *b;

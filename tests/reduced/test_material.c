@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 #include "reduced/material.h"
+#include "tests/reduced/vectors.h"
 
 static uint32_t seed = 1;
 static double uniform(void) { // [-1, 1), a fixed sequence
@@ -26,12 +27,6 @@ static void multiply(const double a[9], const double b[9], double c[9]) {
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++)
       c[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
-}
-
-static double norm(int n, const double *a) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += a[i] * a[i];
-  return sqrt(sum);
 }
 
 static const double lambda = 1.7, mu = 0.6;

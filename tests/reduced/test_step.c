@@ -14,29 +14,10 @@
 #include <cmocka.h>
 
 #include "tests/reduced/bar.h"
+#include "tests/reduced/count_allocations.h"
+#include "tests/reduced/vectors.h"
 
 enum { R = 20, K = 2 };
-
-static volatile int
-    allocations; // counted by the linker's --wrap; compilers think malloc changes nothing
-void *__real_malloc(size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_malloc(size_t size) {
-  allocations++;
-  return __real_malloc(size);
-}
-void *__real_calloc(size_t n, size_t size);
-void *__wrap_calloc(size_t n, size_t size);
-void *__wrap_calloc(size_t n, size_t size) {
-  allocations++;
-  return __real_calloc(n, size);
-}
-void *__real_realloc(void *p, size_t size);
-void *__wrap_realloc(void *p, size_t size);
-void *__wrap_realloc(void *p, size_t size) {
-  allocations++;
-  return __real_realloc(p, size);
-}
 
 typedef struct scene {
   bar *b;
@@ -56,12 +37,6 @@ static void create(scene *s, ep_material material, int k) {
 static void destroy(scene *s) {
   free(s->block);
   bar_free(s->b);
-}
-
-static double norm(const double *a) {
-  double sum = 0;
-  for (int i = 0; i < R; i++) sum += a[i] * a[i];
-  return sqrt(sum);
 }
 
 // With the load of an example's own force the object goes there: weights change, both kinds of
@@ -98,7 +73,7 @@ static void step_is_a_minimum(void **unused) {
                                      ep_state_target(s.state)[c]);
         }
         for (int a = 0; a < R; a++) moved += fabs(x[a] - q[a]);
-        assert_true(norm(f) < 1e-4 * largest); // 1e-6 of forces that include the inertia
+        assert_true(norm(R, f) < 1e-4 * largest); // 1e-6 of forces that include the inertia
       }
       if (kind) assert_true(moved > 0);
       assert_true(ep_state_weights(s.state)[0] + ep_state_weights(s.state)[1] > 1e-3);
@@ -154,14 +129,14 @@ static void rest_stays_at_rest(void **unused) {
   create(&s, EP_STVK_VOLUME, K);
   ep_step_def def = ep_default_step();
   for (int i = 0; i < 20; i++) assert_int_equal(ep_step(s.state, &def, NULL), EP_OK);
-  assert_true(norm(ep_state_q(s.state)) == 0 && norm(ep_state_velocity(s.state)) == 0);
+  assert_true(norm(R, ep_state_q(s.state)) == 0 && norm(R, ep_state_velocity(s.state)) == 0);
   const double *q = s.b->model.example_q;
   double load[R];
   ep_elastic_energy(s.state, q, load, NULL, 0);
   memcpy(ep_state_q(s.state), q, R * sizeof *q);
   def.force = load; // the target is the example: the example force vanishes
   for (int i = 0; i < 20; i++) assert_int_equal(ep_step(s.state, &def, NULL), EP_OK);
-  for (int a = 0; a < R; a++) assert_true(fabs(ep_state_q(s.state)[a] - q[a]) < 1e-6 * norm(q));
+  for (int a = 0; a < R; a++) assert_true(fabs(ep_state_q(s.state)[a] - q[a]) < 1e-6 * norm(R, q));
   destroy(&s);
 }
 
@@ -246,7 +221,7 @@ static void survives_a_hard_push(void **unused) {
     for (int i = 0; i < 60; i++) {
       if (i == 30) def.force = NULL; // released
       assert_int_equal(ep_step(s.state, &def, NULL), EP_OK);
-      assert_true(isfinite(norm(ep_state_q(s.state))));
+      assert_true(isfinite(norm(R, ep_state_q(s.state))));
     }
     destroy(&s);
   }
@@ -292,7 +267,7 @@ static void threads_agree(void **unused) {
   assert_non_null(run(&a));
   pthread_join(other, &result);
   assert_non_null(result);
-  assert_true(norm(ep_state_q(a.state)) > 0);
+  assert_true(norm(R, ep_state_q(a.state)) > 0);
   assert_memory_equal(ep_state_q(a.state), ep_state_q(b.state), R * sizeof(double));
   free(b.block);
   destroy(&a);
