@@ -117,7 +117,7 @@ void ep_state_positions(const ep_state *state, double *x);
 
 // ---- energies --------------------------------------------------------------------------------
 // (Not ep_elastic: that is the type of material constants in mesh/mesh.h.)
-// Elastic energy of the model at q by its evaluator; f (r) = dW/dq and stiffness k (r x r,
+// Elastic energy of the model at q by its evaluator, with that of its guards; f (r) = dW/dq and stiffness k (r x r,
 // symmetric, both triangles) unless NULL. project != 0: element tangents projected to positive
 // semidefinite. Uses the state's scratch, changes nothing else.
 double ep_elastic_energy(ep_state *state, const double *q, double *f, double *k, int project);

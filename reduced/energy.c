@@ -83,13 +83,16 @@ double ep_cubic_add(ep_state *state, double scale, const double *q, double *f, d
 
 double ep_elastic_energy(ep_state *state, const double *q, double *f, double *k, int project) {
   const size_t r = (size_t)state->model->size.r;
-  if (!ep_is_cubature(state->model->evaluator)) {
+  double energy;
+  if (ep_is_cubature(state->model->evaluator)) {
+    state->term[0] = (ep_kernel_term){.scale = 1, .weight = state->model->cubature_w};
+    energy = ep_evaluate(state, 1, q, f, k, project);
+  } else {
     if (f) memset(f, 0, r * sizeof *f);
     if (k) memset(k, 0, r * r * sizeof *k);
-    return ep_cubic_add(state, 1, q, f, k, project);
+    energy = ep_cubic_add(state, 1, q, f, k, project);
   }
-  state->term[0] = (ep_kernel_term){.scale = 1, .weight = state->model->cubature_w};
-  return ep_evaluate(state, 1, q, f, k, project);
+  return energy + ep_guard_add(state, q, f, k, project);
 }
 
 // Terms of the examples with weight; w (k). Returns the number of terms after these.

@@ -11,6 +11,8 @@ enum { EP_LANES = 8 };
 
 // A law of the kernels beside those of ep_material: the penalty of EP_STVK_VOLUME alone.
 #define EP_VOLUME_PENALTY EP_MATERIALS
+// And the wall of the guards (reduced/guard.h); lambda holds its stiffness, mu the limit.
+#define EP_GUARD_WALL (EP_MATERIALS + 1)
 
 // One energy: scale * sum_j weight_j psi(F_j(q) inverse_j).
 typedef struct ep_kernel_term {

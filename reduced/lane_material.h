@@ -3,6 +3,7 @@
 #ifndef EP_REDUCED_LANE_MATERIAL_H
 #define EP_REDUCED_LANE_MATERIAL_H
 
+#include "reduced/guard.h"
 #include "reduced/lanes.h"
 #include "reduced/material.h"
 
@@ -122,6 +123,41 @@ LANE_INLINE lane lane_penalty(lane lambda, lane mu, const lane f[9], lane *p, la
   return lane_add_penalty(lane_all(0), lambda, mu, f, p, h);
 }
 
+// ---- the guards' wall (reduced/guard.h) ---------------------------------------------------------
+
+LANE_INLINE lane lane_log(lane x) {
+  lane y;
+  for (int i = 0; i < 8; i++) y[i] = log(x[i]);
+  return y;
+}
+
+// b(x) = -(x - 1)^2 log x below 1, with its derivatives; below the floor its parabola there.
+LANE_INLINE lane lane_wall(lane x, lane *slope, lane *curvature) {
+  const lane one = lane_all(1), two = lane_all(2), floor = lane_all(EP_GUARD_FLOOR);
+  const lane y = lane_select(x < one, lane_select(x < floor, floor, x), one);
+  const lane past = lane_select(x < floor, x - floor, lane_all(0));
+  const lane gap = y - one, ratio = gap / y, l = lane_log(y);
+  *curvature = ratio * ratio - two * l - lane_all(4) * ratio;
+  const lane first = -(two * gap * l + gap * ratio);
+  *slope = first + *curvature * past;
+  return (first + lane_all(0.5) * *curvature * past) * past - gap * gap * l;
+}
+
+LANE_INLINE lane lane_guard(lane stiffness, lane limit, const lane f[9], lane *p, lane *h) {
+  const lane one = lane_all(1), safe = lane_select(limit > lane_all(0), limit, one);
+  lane slope, curvature, c[9];
+  const lane psi = stiffness * lane_wall(lane_determinant(f) / safe, &slope, &curvature);
+  if (!p) return psi;
+  lane_cofactor(f, c);
+  slope *= stiffness / safe;
+  for (int i = 0; i < 9; i++) p[i] = slope * c[i];
+  if (!h) return psi;
+  for (int i = 0; i < 81; i++) h[i] = lane_all(0);
+  lane_add_outer(curvature * stiffness / (safe * safe), c, h);
+  lane_add_cofactor_derivative(slope, f, h);
+  return psi;
+}
+
 // ---- stable neo-Hookean ------------------------------------------------------------------------
 
 LANE_INLINE lane lane_log1p(lane x) {
@@ -188,6 +224,7 @@ LANE_INLINE lane lane_corotational(lane lambda, lane mu, const lane f[9], lane *
 
 LANE_INLINE lane lane_material(ep_material model, lane lambda, lane mu, const lane f[9], lane *p,
                                lane *h) {
+  if (model == EP_GUARD_WALL) return lane_guard(lambda, mu, f, p, h);
   if (model == EP_VOLUME_PENALTY) return lane_penalty(lambda, mu, f, p, h);
   if (model == EP_STABLE_NEOHOOKEAN) return lane_neohookean(lambda, mu, f, p, h);
   if (model == EP_COROTATIONAL) return lane_corotational(lambda, mu, f, p, h);

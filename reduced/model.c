@@ -7,7 +7,7 @@
 #include "reduced/tensorfile.h"
 #include "reduced/text.h"
 
-enum { SCHEMA = 1, MAX_MODES = 4096, MAX_EXAMPLES = 1024 };
+enum { SCHEMA = 2, MAX_MODES = 4096, MAX_EXAMPLES = 1024 };
 
 // ---- metadata ----------------------------------------------------------------------------------
 
@@ -47,7 +47,7 @@ static ep_status read_kind(const ep_tensorfile *file, char *message) {
   if (schema != SCHEMA) {
     ep_text_set(message, "model schema ");
     ep_text_add_number(message, schema);
-    ep_text_add(message, "; this version reads schema 1: bake the scene again, or update");
+    ep_text_add(message, "; this version reads schema 2: bake the scene again, or update");
     return EP_ERR_FORMAT;
   }
   if ((status = read_text(file, "real", text, message)) != EP_OK) return status;
@@ -201,6 +201,7 @@ static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *m
   const int greens = model->size.greens, cubic = model->size.cubic;
   const int cubature_float = model->size.cubature_float;
   const int cubic_float = model->size.cubic_float, rigid = model->size.rigid;
+  const int guards = model->size.guards;
   const int contacts = model->size.contacts, nodes = model->size.nodes;
   const int regions = model->size.regions;
   const void *data;
@@ -224,6 +225,12 @@ static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *m
   FIRST_FAILURE(check_at_least_zero("cubature_w", model->cubature_w, s, message));
   FIRST_FAILURE(check_at_least_zero("cubature_lambda", model->cubature_lambda, s, message));
   FIRST_FAILURE(check_at_least_zero("cubature_mu", model->cubature_mu, s, message));
+  FIRST_FAILURE(check_index("guard_tet", model->guard_tet, guards, nt, message));
+  FIRST_FAILURE(check_at_least_zero("guard_w", model->guard_w, guards, message));
+  FIRST_FAILURE(check_at_least_zero("guard_stiffness", model->guard_stiffness, guards, message));
+  FIRST_FAILURE(check_at_least_zero("guard_limit", model->guard_limit, guards, message));
+  FIRST_FAILURE(check_at_least_zero("guard_growth", model->guard_growth,
+                                    (guards + 7) / 8 * 8 * blocks, message));
   FIRST_FAILURE(check_index("contact_vertex", model->contact_vertex, contacts, n, message));
   FIRST_FAILURE(check_at_least_zero("contact_area", model->contact_area, contacts, message));
   FIRST_FAILURE(check_at_least_zero("tree_radius", model->tree_radius, nodes, message));

@@ -6,7 +6,8 @@
 //   included for constrained objects; 0 where no descriptors are used; with regions the sum of
 //   theirs), k examples, regions sets of examples (0: one set, acting everywhere), s cubature
 //   elements, blocks = ceil(r / 8): groups of 8 modes, greens independent strains of the examples
-//   (Green-strain path; 0: not used), cubic and cubic_float reals of the cubic path's streams (0:
+//   (Green-strain path; 0: not used), guards elements that only keep themselves from turning over
+//   (reduced/guard.h; 0: none), cubic and cubic_float reals of the cubic path's streams (0:
 //   not used; then without interpolation s may be 0), rigid 1 where nothing is held (free motion),
 //   contacts surface vertices that can move and nodes of the tree over them (0: no obstacles).
 #ifndef EP_REDUCED_MODEL_ARRAYS_H
@@ -16,7 +17,7 @@
   X(n)                                                                                             \
   X(nt)                                                                                            \
   X(r) X(m) X(k) X(regions) X(s) X(blocks) X(greens) X(cubic) X(cubic_float) X(cubature_float)     \
-      X(rigid) X(contacts) X(nodes)
+      X(guards) X(rigid) X(contacts) X(nodes)
 
 // clang-format off
 #define EP_MODEL_ARRAYS(X)                                                                        \
@@ -66,6 +67,15 @@
   X(double, green_weights, k, greens, 1)                                                          \
   X(double, green_energy,  greens ? k : 0, 1, 1)                                                  \
   X(double, green_scale,   greens ? 1 : 0, 1, 1)                                                  \
+  /* guards (reduced/guard.h): element number, weight [volume], stiffness [Pa], share of its    */ \
+  /* volume below which it resists; G packed as of cubature; per group of 8 guards the largest   */ \
+  /* |G_a|_F of each mode, modes beyond r zero */                                                 \
+  X(int32,  guard_tet,     guards, 1, 1)                                                          \
+  X(double, guard_w,       guards, 1, 1)                                                          \
+  X(double, guard_stiffness, guards, 1, 1)                                                        \
+  X(double, guard_limit,   guards, 1, 1)                                                          \
+  X(double, guard_g,       guards, blocks, 72)                                                    \
+  X(double, guard_growth,  (guards + 7) / 8, blocks, 8)                                           \
   /* exact StVK energy over all elements as one quartic form (reduced/cubic.h), in doubles, in */ \
   /* floats; sums over all elements: largest |G_e|_F, energy and force at unit strain */          \
   X(double, cubic_stream,  cubic, 1, 1)                                                           \

@@ -21,6 +21,7 @@ static size_t lay_out(const ep_model *model, char *memory, ep_state *state) {
   const size_t s = (size_t)model->size.s, width = 8 * (size_t)model->size.blocks;
   const int floats = model->evaluator == EP_EVALUATE_CUBATURE_FLOAT;
   const size_t greens = (size_t)model->size.greens, contacts = (size_t)model->size.contacts;
+  const size_t guard_groups = ((size_t)model->size.guards + EP_LANES - 1) / EP_LANES;
   const size_t regions = (size_t)model->size.regions, sets = (size_t)ep_model_regions(model);
   const size_t free = model->size.rigid ? r : 0, n = model->size.rigid ? r + 6 : r;
   const size_t examples = k > 0 && m > 0; // without descriptors their scratch is left out
@@ -28,6 +29,11 @@ static size_t lay_out(const ep_model *model, char *memory, ep_state *state) {
       ep_is_cubature(model->evaluator)
           ? 0
           : ep_cubic_scratch(model->size.r, precision_of(model)) / sizeof(double);
+  size_t scratch = (size_t)ep_kernel_scratch(model->size.blocks, floats);
+  if (model->size.guards > 0) { // always in doubles
+    const size_t wide = (size_t)ep_kernel_scratch(model->size.blocks, 0);
+    scratch = scratch > wide ? scratch : wide;
+  }
   size_t used = rounded(sizeof *state);
   if (memory) state->term = (ep_kernel_term *)(memory + used);
   used += rounded((k + 2 * sets) * sizeof *state->term);

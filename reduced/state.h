@@ -6,6 +6,7 @@
 #include "reduced/contact_law.h"
 #include "reduced/eigenpose.h"
 #include "reduced/green.h"
+#include "reduced/guard.h"
 #include "reduced/kernel.h"
 #include "reduced/region.h"
 
@@ -29,7 +30,7 @@
   X(padded_q, width)       /* what the kernels read and write */                                  \
   X(padded_f, width)                                                                              \
   X(padded_k, width * width)                                                                      \
-  X(kernel_scratch, ep_kernel_scratch((int)(width / 8), floats))                                  \
+  X(kernel_scratch, scratch)                                                                      \
   X(x, n)                  /* Newton: point, gradient, direction, trial, Hessian, its factor */   \
   X(g, n)                                                                                         \
   X(direction, n)                                                                                 \
@@ -53,6 +54,8 @@
   X(cubic_at, cubic_words ? r : 0)                                                                \
   X(cubic_f, cubic_words ? r : 0)                                                                 \
   X(cubic_k, cubic_words ? r * r : 0)                                                             \
+  X(guard_at, guard_groups * r) /* guards: where each group was looked at, and its way from there */ \
+  X(guard_reach, guard_groups)                                                                    \
   X(green_y0, greens)      /* Green-strain path (reduced/green.c) */                              \
   X(green_y, greens)                                                                              \
   X(green_last, greens)                                                                           \

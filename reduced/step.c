@@ -75,6 +75,7 @@ static double inner_energy(ep_step_run *s, const double *x, double *g, double *h
   s->pull = 0;
   for (int i = first; i < terms; i++) s->pull += state->term[i].energy;
   s->elastic = by_cubature ? state->term[0].energy : ep_cubic_add(state, share, x, g, h, project);
+  s->elastic += ep_guard_add(state, x, g, h, project);
   if (s->examples && !as_energy)
     s->pull = 0.5 * def->strength * add_k0(s, def->strength, x, state->next_target, g);
   // At alpha = 1 elastic and example force cancel: the residual is relative to each.

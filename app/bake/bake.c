@@ -32,6 +32,7 @@ void ep_bake_close(ep_bake *bake) {
   ep_modes_free(&bake->modes);
   ep_basis_free(&bake->basis);
   ep_cubature_free(&bake->cubature);
+  ep_guards_free(&bake->guards);
   ep_green_coefficients_free(&bake->green);
   ep_fem_free(&bake->fem);
   if (bake->petsc) ep_petsc_stop();

@@ -6,6 +6,7 @@
 #include "align/align.h"
 #include "app/plan/plan.h"
 #include "cubature/cubature.h"
+#include "cubature/guards.h"
 #include "lbspace/lbspace.h"
 #include "reduced/bake/basis.h"
 #include "reduced/bake/green_coefficients.h"
@@ -42,6 +43,7 @@ typedef struct ep_bake {
   double *paths; // (examples * samples x 3n)
   ep_basis basis;
   ep_cubature cubature;
+  ep_guards guards;
   // local examples, in the sets of shapes; NULL without
   ep_region_part *region;
   int *example_region; // (examples)
@@ -66,6 +68,7 @@ ep_status ep_bake_modes(ep_bake *bake, ep_error *err);
 ep_status ep_bake_paths(ep_bake *bake, ep_error *err);
 ep_status ep_bake_basis(ep_bake *bake, ep_error *err);
 ep_status ep_bake_cubature(ep_bake *bake, ep_error *err);
+ep_status ep_bake_guards(ep_bake *bake, ep_error *err);
 // Share of each tet in the region of each example (examples x nt), malloc'd; NULL in *out where
 // every example acts everywhere.
 ep_status ep_bake_shares(const ep_bake *bake, double **out, ep_error *err);

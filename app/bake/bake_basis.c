@@ -282,6 +282,7 @@ static ep_status write_model(ep_bake *bake, const char *path, ep_error *err) {
   EP_TRY(ep_bake_basis(bake, err));
   EP_TRY(ep_bake_green(bake, err));
   EP_TRY(ep_bake_cubic(bake, err));
+  EP_TRY(ep_bake_guards(bake, err));
   EP_TRY(ep_bake_regions(bake, err));
   if (examples) EP_TRY(ep_bake_lb(bake, 0, err));
   ep_contact_tree tree = {.contacts = 0};
@@ -299,6 +300,10 @@ static ep_status write_model(ep_bake *bake, const char *path, ep_error *err) {
       .s = bake->cubature.count,
       .tet = bake->cubature.tet,
       .weight = bake->cubature.weight,
+      .guards = bake->guards.count,
+      .guard_tet = bake->guards.tet,
+      .guard_w = bake->guards.weight,
+      .guard_limit = bake->guards.limit,
       .green = bake->green.b ? &bake->green : NULL,
       .cubic = bake->cubic,
       .contact = tree.contacts ? &tree : NULL,

@@ -14,8 +14,8 @@
 static const int stage_version[] = {
     [EP_STAGE_EIGEN] = 1, [EP_STAGE_MAP] = 5,   [EP_STAGE_POSES] = 4,    [EP_STAGE_MODES] = 1,
     [EP_STAGE_PATHS] = 2, [EP_STAGE_BASIS] = 1, [EP_STAGE_CUBATURE] = 1, [EP_STAGE_GREEN] = 1,
-    [EP_STAGE_MODEL] = 5, [EP_STAGE_CUBIC] = 1, [EP_STAGE_TARGET] = 1,   [EP_STAGE_CONTACT] = 1,
-    [EP_STAGE_FRAME] = 1,
+    [EP_STAGE_MODEL] = 6, [EP_STAGE_CUBIC] = 1, [EP_STAGE_TARGET] = 1,   [EP_STAGE_CONTACT] = 1,
+    [EP_STAGE_FRAME] = 1, [EP_STAGE_GUARDS] = 1,
 };
 
 // Matching raises the number of functions to 20 (DESIGN "Maps"), between the rest shape and a pose
@@ -37,7 +37,7 @@ const char *ep_stage_kind_name(ep_stage_kind kind) {
       [EP_STAGE_CUBATURE] = "cubature", [EP_STAGE_MODEL] = "model",
       [EP_STAGE_CUBIC] = "cubic",       [EP_STAGE_TARGET] = "interpolation",
       [EP_STAGE_CONTACT] = "contact",   [EP_STAGE_GREEN] = "green",
-      [EP_STAGE_FRAME] = "frame",
+      [EP_STAGE_FRAME] = "frame",       [EP_STAGE_GUARDS] = "guards",
   };
   return names[kind];
 }
@@ -368,6 +368,31 @@ static void plan_cubature(planner *p) {
   stage->key = ep_hash_done(&text);
 }
 
+static void plan_guards(planner *p) {
+  const ep_scene *scene = p->scene;
+  const ep_stage *cubature = ep_plan_find(p->plan, EP_STAGE_CUBATURE);
+  const int nt = p->shapes->shape[0].mesh.nt;
+  const char *reason = NULL;
+  if (scene->model == EP_STVK)
+    reason = "stvk without the volume penalty: nothing is kept from turning over";
+  else if (scene->guards == 0)
+    reason = "reduction.guards is 0";
+  else if (!cubature->runs || scene->elements >= nt)
+    reason = "every element resists turning over already";
+  if (reason) {
+    add(p, EP_STAGE_GUARDS, NULL, false, "%s", reason);
+    return;
+  }
+  ep_stage *stage = add(p, EP_STAGE_GUARDS, NULL, true,
+                        "up to %d of the elements that turn over unseen when pushed hard",
+                        scene->guards);
+  ep_hash_text text = key_of(stage->kind);
+  add_stage_key(p, &text, EP_STAGE_BASIS);
+  add_stage_key(p, &text, EP_STAGE_CUBATURE);
+  ep_hash_add(&text, "guards=%d seed=%llu", scene->guards, (unsigned long long)scene->seed);
+  stage->key = ep_hash_done(&text);
+}
+
 static void plan_cubic(planner *p) {
   if (!is_cubic(p)) {
     add(p, EP_STAGE_CUBIC, NULL, false, "reduction.evaluator is cubature");
@@ -410,6 +435,7 @@ static void plan_model(planner *p) {
   ep_hash_text text = key_of(stage->kind);
   add_stage_key(p, &text, EP_STAGE_BASIS);
   add_stage_key(p, &text, EP_STAGE_CUBATURE);
+  add_stage_key(p, &text, EP_STAGE_GUARDS);
   const bool descriptors = uses_descriptors(p);
   ep_hash_add(&text, "m=%d %s", descriptors ? p->scene->eigenfunctions : 0,
               descriptors ? ep_plan_eigen(p->plan, 0)->key.hex : "none");
@@ -478,6 +504,7 @@ static ep_status fill(planner *p) {
   plan_paths(p);
   plan_basis(p);
   plan_cubature(p);
+  plan_guards(p);
   plan_cubic(p);
   plan_green(p);
   plan_model(p);
@@ -490,7 +517,7 @@ static ep_status fill(planner *p) {
 ep_status ep_plan_make(const ep_scene *scene, const ep_shapes *shapes, ep_plan *out,
                        ep_error *err) {
   memset(out, 0, sizeof *out);
-  const size_t most = (size_t)shapes->count + 2 * (size_t)shapes->examples + 13;
+  const size_t most = (size_t)shapes->count + 2 * (size_t)shapes->examples + 14;
   out->stage = calloc(most, sizeof *out->stage);
   if (!out->stage) return ep_fail(err, EP_ERR_MEMORY, "no memory for the plan");
   planner p = {.scene = scene, .shapes = shapes, .plan = out, .err = err};

@@ -15,6 +15,7 @@ typedef enum ep_stage_kind {
   EP_STAGE_PATHS,    // samples from rest to each pose
   EP_STAGE_BASIS,    // U
   EP_STAGE_CUBATURE, // elements and weights
+  EP_STAGE_GUARDS,   // elements that only keep themselves from turning over
   EP_STAGE_GREEN,    // coefficients of the Green-strain path
   EP_STAGE_CUBIC,    // coefficients of the exact polynomials
   EP_STAGE_MODEL,    // the .epm file

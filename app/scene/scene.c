@@ -57,6 +57,7 @@ static ep_status read_reduction(const ep_scene_reader *r, const raw_reduction *g
       {"linear_modes", raw->linear_modes, 15, 1, 100, &out->linear_modes},
       {"path_samples", raw->path_samples, 4, 0, 32, &out->path_samples},
       {"elements", raw->elements, 60, 1, 10000, &out->elements},
+      {"guards", raw->guards, 256, 0, 4096, &out->guards},
       {"training_poses", raw->training_poses, 200, 10, 10000, &out->training_poses},
   };
   for (size_t i = 0; i < sizeof wholes / sizeof *wholes; i++) {

@@ -160,7 +160,8 @@ typedef struct ep_scene {
   int nfamilies;
   ep_family *family;
   ep_evaluator evaluator; // of the elastic energy: cubature, or cubic polynomials (StVK)
-  int eigenfunctions, modes, linear_modes, path_samples, elements, training_poses;
+  int eigenfunctions, modes, linear_modes, path_samples, elements, guards;
+  int training_poses;
   double amplitude;
   ep_integrator integrator;
   double dt;

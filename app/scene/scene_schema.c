@@ -164,6 +164,7 @@ static const cyaml_schema_field_t reduction_fields[] = {
     NUMBER(raw_reduction, linear_modes),
     NUMBER(raw_reduction, path_samples),
     NUMBER(raw_reduction, elements),
+    NUMBER(raw_reduction, guards),
     NUMBER(raw_reduction, training_poses),
     CYAML_FIELD_ENUM_PTR("evaluator", OPTIONAL | CYAML_FLAG_STRICT, raw_reduction, evaluator,
                          evaluator_names, CYAML_ARRAY_LEN(evaluator_names)),

@@ -65,7 +65,8 @@ typedef struct raw_family {
   raw_region *region;
 } raw_family;
 typedef struct raw_reduction {
-  double *eigenfunctions, *modes, *linear_modes, *path_samples, *elements, *training_poses;
+  double *eigenfunctions, *modes, *linear_modes, *path_samples, *elements, *guards;
+  double *training_poses;
   double *amplitude;
   int *evaluator;
 } raw_reduction;

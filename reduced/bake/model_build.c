@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "reduced/bake/inertia.h"
+#include "reduced/guard.h"
 #include "reduced/reference.h"
 
 // The arrays while they are written; the model itself holds pointers to const.
@@ -64,6 +65,12 @@ static ep_status check_parts(const ep_model_parts *p, ep_error *err) {
       return ep_fail(err, EP_ERR_ARGUMENT, "cubature element %d has the weight %g", j,
                      p->weight[j]);
   }
+  for (int i = 0; i < p->guards; i++) {
+    if (p->guard_tet[i] < 0 || p->guard_tet[i] >= p->fem->mesh->nt || !(p->guard_w[i] >= 0) ||
+        !(p->guard_limit[i] > 0) || !isfinite(p->guard_w[i] + p->guard_limit[i]))
+      return ep_fail(err, EP_ERR_ARGUMENT, "guard %d is tet %d with weight %g and limit %g", i,
+                     p->guard_tet[i], p->guard_w[i], p->guard_limit[i]);
+  }
   return EP_OK;
 }
 
@@ -75,7 +82,7 @@ static ep_status allocate(builder *b, ep_model_memory *out, ep_error *err) {
   int regions = z->regions, cubature_float = z->cubature_float;
   (void)n, (void)nt, (void)r, (void)m, (void)k, (void)s, (void)blocks, (void)greens, (void)cubic,
       (void)cubic_float, (void)rigid, (void)regions, (void)cubature_float;
-  const int contacts = z->contacts, nodes = z->nodes;
+  const int contacts = z->contacts, nodes = z->nodes, guards = z->guards;
 #define X(type, name, d1, d2, d3)                                                                  \
   if ((size_t)(d1) * (size_t)(d2) * (size_t)(d3) > 0) {                                            \
     size_t bytes = (size_t)(d1) * (size_t)(d2) * (size_t)(d3) * sizeof *b->a.name;                 \
@@ -244,6 +251,36 @@ static ep_status build_cubature(builder *b, ep_error *err) {
   return status;
 }
 
+// Stiffness of the wall over the penalty of the material: both resist a flat element alike where
+// the wall begins.
+static double wall_stiffness(const ep_fem *fem, int e) {
+  return EP_GUARD_STIFFNESS * fmax(fem->lambda[e], fem->mu[e]);
+}
+
+static ep_status build_guards(builder *b, ep_error *err) {
+  const ep_model_parts *p = b->parts;
+  const size_t r = (size_t)b->size.r, width = 8 * (size_t)b->size.blocks;
+  if (!p->guards) return EP_OK;
+  double *g = malloc((size_t)p->guards * 9 * r * sizeof *g);
+  if (!g) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d guards", p->guards);
+  for (size_t i = 0; i < (size_t)p->guards; i++) {
+    double *gi = g + i * 9 * r, *growth = b->a.guard_growth + i / 8 * width;
+    element_gradient(b, p->guard_tet[i], gi);
+    b->a.guard_tet[i] = p->guard_tet[i];
+    b->a.guard_w[i] = p->guard_w[i];
+    b->a.guard_limit[i] = p->guard_limit[i];
+    b->a.guard_stiffness[i] = wall_stiffness(p->fem, p->guard_tet[i]);
+    for (size_t a = 0; a < r; a++) {
+      double square = 0;
+      for (size_t c = 0; c < 9; c++) square += gi[c * r + a] * gi[c * r + a];
+      growth[a] = fmax(growth[a], sqrt(square));
+    }
+  }
+  ep_pack_cubature(b->size.r, p->guards, g, b->a.guard_g);
+  free(g);
+  return EP_OK;
+}
+
 static void fill_green(builder *b) {
   const ep_green_coefficients *green = b->parts->green;
   const int r = b->size.r, k = b->size.k, count = b->size.greens;
@@ -337,6 +374,7 @@ static ep_model_sizes sizes_of(const ep_model_parts *p) {
                           .cubic = cubic_size(p, EP_DOUBLE),
                           .cubic_float = cubic_size(p, EP_FLOAT),
                           .cubature_float = !p->cubic && p->precision == EP_FLOAT ? p->s : 0,
+                          .guards = p->guards,
                           .contacts = p->contact ? p->contact->contacts : 0,
                           .nodes = p->contact ? p->contact->nodes : 0,
                           .rigid = ep_fem_is_free(p->fem)};
@@ -352,6 +390,7 @@ ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_e
   if (b.size.m > 0) EP_TRY_GOTO(status, build_descriptors(&b, err), fail);
   EP_TRY_GOTO(status, build_regions(&b, err), fail);
   EP_TRY_GOTO(status, build_cubature(&b, err), fail);
+  EP_TRY_GOTO(status, build_guards(&b, err), fail);
   fill_green(&b);
   fill_contact(&b);
   if (b.size.rigid) EP_TRY_GOTO(status, fill_inertia(&b, err), fail);

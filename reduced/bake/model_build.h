@@ -28,6 +28,10 @@ typedef struct ep_model_parts {
   const ep_green_coefficients *green; // of the Green-strain path, NULL: not used
   const double *cubic;                // (ep_cubic_count(r)) exact StVK coefficients, NULL: not used
   ep_precision precision;             // of the model's evaluator: polynomials, else cubature
+  int guards;                         // reduced/guard.h; 0: none
+  const int *guard_tet;               // (guards) element numbers
+  const double *guard_w;              // (guards) weights, >= 0 [volume]
+  const double *guard_limit;          // (guards) shares of the volume, > 0
   const ep_contact_tree *contact;     // surface of the basis' mesh and modes, NULL: no obstacles
 } ep_model_parts;
 

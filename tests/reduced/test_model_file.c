@@ -48,7 +48,7 @@ static void same_arrays(const ep_model *x, const ep_model *y) {
   const int cubic = x->size.cubic, cubic_float = x->size.cubic_float;
   const int rigid = x->size.rigid, cubature_float = x->size.cubature_float;
   const int contacts = x->size.contacts, nodes = x->size.nodes;
-  const int regions = x->size.regions;
+  const int regions = x->size.regions, guards = x->size.guards;
 #define SAME(type, name, d1, d2, d3)                                                               \
   if ((d1) * (d2) * (d3) == 0)                                                                     \
     assert_null(x->name);                                                                          \

@@ -1,0 +1,32 @@
+// Guards: elements that do nothing until they are nearly flat, and then resist. The volume penalty
+// of the material acts at the cubature elements alone; the others can turn over unseen. The bake
+// finds which do (cubature/guards.h) and adds them here.
+//
+//   W_g = sum_e w_e k_e b(J_e / limit_e),   b(x) = -(x - 1)^2 log x  below 1, 0 above
+// (the barrier of Li et al. 2020, "Incremental Potential Contact", eq. 6), continued below
+// x = EP_GUARD_FLOOR by its parabola there: C2 everywhere, and an object that starts inverted or
+// collapsed finds its way back. The wall stands whatever relief, alpha and strength say: it is no
+// part of the material's resistance.
+//
+// What is far from its limit is not looked at: of every group of 8 guards the state remembers where
+// it was looked at last, q_0, and how far F may go from there before any of the group can reach its
+// limit. |F - F_0| <= sum_a |q_a - q_0a| growth_a, and
+//   det(F_0 + D) >= J_0 - |cof F_0| d - |F_0| d^2 / sqrt 3 - d^3 / (3 sqrt 3),   d = |D|.
+// Groups passed over would have added exact zeros: results do not depend on what was remembered.
+#ifndef EP_REDUCED_GUARD_H
+#define EP_REDUCED_GUARD_H
+
+// Share of the limit below which the wall goes on as a parabola.
+#define EP_GUARD_FLOOR 0.02
+
+// k = this times max(lambda, mu). The material's own penalty, 5 max(lambda, mu) (J - 0.5)^2, has the
+// force of the wall where J is a third of the limit.
+#define EP_GUARD_STIFFNESS 1.0
+
+struct ep_state;
+
+// W_g at q (r); its gradient and Hessian are added to f (r) and h (r x r, both triangles) unless
+// NULL. project != 0: element tangents projected to positive semidefinite. 0 without guards.
+double ep_guard_add(struct ep_state *state, const double *q, double *f, double *h, int project);
+
+#endif
