@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "reduced/kernel.h"
+#include "reduced/lane_jacobi.h"
 #include "reduced/lane_material.h"
 
 // Register tile of K += G^T B: rows x vectors of 8 columns.
@@ -103,15 +104,6 @@ static void add_term(const ep_kernel_task *t, const ep_kernel_term *term, int fi
   }
   for (int c = 0; c < 9; c++) stress[c] += w * p[c];
   for (int c = 0; tangent && c < 81; c++) tangent[c] += w * h[c];
-}
-
-static void project_tangents(lane tangent[81]) {
-  double h[81];
-  for (int e = 0; e < EP_LANES; e++) {
-    for (int c = 0; c < 81; c++) h[c] = tangent[c][e];
-    ep_material_project(h);
-    for (int c = 0; c < 81; c++) tangent[c][e] = h[c];
-  }
 }
 
 // f += G^T P for the elements of one group, three chains of additions.
@@ -214,7 +206,7 @@ void EP_KERNEL(ep_kernel_task *t) {
     if (t->f && t->g_float) narrow_force(t, first, stress);
     if (t->f && !t->g_float) add_force(t, first, stress);
     if (!t->k) continue;
-    if (t->project) project_tangents(tangent);
+    if (t->project) lane_project(tangent);
     if (t->g_float) {
       narrow_stiffness(t, first, tangent, k);
       continue;
