@@ -9,7 +9,7 @@
 
 // A guard resists below this share of its volume; below this part of the share that an example or
 // the pose itself leaves it, so that no guard stands between the object and an example.
-static const double wall_begins = 0.2, of_example = 0.5;
+static const double wall_begins = 0.3, of_example = 0.5;
 static const double pi = 3.14159265358979323846;
 enum { STEPS_A_PERIOD = 24, HALVINGS = 4, POWER_ITERATIONS = 30 };
 
@@ -61,8 +61,7 @@ static void allow(ep_guard_model *m) {
   for (int e = 0; e < m->elements.nt; e++) {
     double least = 1;
     for (size_t i = 0; i < (size_t)m->basis->examples; i++)
-      least =
-          fmin(least, ep_element_gradient(&m->elements, e, m->basis->example_q + i * r, f));
+      least = fmin(least, ep_element_gradient(&m->elements, e, m->basis->example_q + i * r, f));
     m->allowed[e] = least > 0 ? fmin(wall_begins, of_example * least) : 0;
   }
 }

@@ -11,12 +11,12 @@
 // of 3; moderate ones come first and get their guards before the hardest ones do.
 static const double severity[] = {1, 10, 100, 1000};
 enum { SEVERITIES = sizeof severity / sizeof *severity };
-enum { PUSHED = 12, FREE = 36 }; // steps of a push, and after it
+enum { PUSHED = 12, FREE = 24 }; // steps of a push, and after it
 enum { ROUNDS = 40 };            // of one push, with the guards it asked for
 enum { STREAM_PUSHES = 201, STREAM_HELD_OUT };
 
 ep_guard_options ep_default_guard_options(void) {
-  return (ep_guard_options){.most = 256, .pushes = 12, .seed = 1};
+  return (ep_guard_options){.most = 256, .pushes = 8, .seed = 1};
 }
 
 void ep_guards_free(ep_guards *guards) {
@@ -30,8 +30,8 @@ typedef struct chooser {
   const ep_guard_options *options;
   ep_guard_model model;
   ep_random rng;
-  double *mass; // (nv) lumped volumes
-  double *u;    // (3 nv) scratch
+  double *mass;          // (nv) lumped volumes
+  double *u;             // (3 nv) scratch
   double *force, *start; // (r) of the push at hand
   int *root, *worst;     // (nv) clusters: union-find over vertices, element with the least J
   bool full;
@@ -59,8 +59,7 @@ static void add_patch(chooser *c, double *u) {
       for (size_t i = 0; i < 3; i++) square += pow(mesh->x[3 * v + i] - centre[i], 2);
       if (square > radius * radius) continue;
       if (pass == 0) total += c->mass[v];
-      for (size_t i = 0; i < 3 && pass == 1; i++)
-        u[3 * v + i] += direction[i] * c->mass[v] / total;
+      for (size_t i = 0; i < 3 && pass == 1; i++) u[3 * v + i] += direction[i] * c->mass[v] / total;
     }
 }
 

@@ -19,9 +19,9 @@
 // Share of the limit below which the wall goes on as a parabola.
 #define EP_GUARD_FLOOR 0.02
 
-// k = this times max(lambda, mu). The material's own penalty, 5 max(lambda, mu) (J - 0.5)^2, has the
-// force of the wall where J is a third of the limit.
-#define EP_GUARD_STIFFNESS 1.0
+// k = this times max(lambda, mu). The material's own penalty, 5 max(lambda, mu) (J - 0.5)^2, has
+// the force of the wall where J is a third of the limit.
+#define EP_GUARD_STIFFNESS 10.0
 
 struct ep_state;
 

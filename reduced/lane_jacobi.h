@@ -1,5 +1,5 @@
-// The projection of material.c over 8 elements at once: the rotations of jacobi.c in the same order,
-// lanes that are done turn by nothing. Private to the kernels.
+// The projection of material.c over 8 elements at once: the rotations of jacobi.c in the same
+// order, lanes that are done turn by nothing. Private to the kernels.
 #ifndef EP_REDUCED_LANE_JACOBI_H
 #define EP_REDUCED_LANE_JACOBI_H
 

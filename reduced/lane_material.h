@@ -125,9 +125,9 @@ LANE_INLINE lane lane_penalty(lane lambda, lane mu, const lane f[9], lane *p, la
 
 // ---- the guards' wall (reduced/guard.h) ---------------------------------------------------------
 
-LANE_INLINE lane lane_log(lane x) {
+LANE_INLINE lane lane_log1p(lane x) {
   lane y;
-  for (int i = 0; i < 8; i++) y[i] = log(x[i]);
+  for (int i = 0; i < 8; i++) y[i] = log1p(x[i]);
   return y;
 }
 
@@ -136,7 +136,7 @@ LANE_INLINE lane lane_wall(lane x, lane *slope, lane *curvature) {
   const lane one = lane_all(1), two = lane_all(2), floor = lane_all(EP_GUARD_FLOOR);
   const lane y = lane_select(x < one, lane_select(x < floor, floor, x), one);
   const lane past = lane_select(x < floor, x - floor, lane_all(0));
-  const lane gap = y - one, ratio = gap / y, l = lane_log(y);
+  const lane gap = y - one, ratio = gap / y, l = lane_log1p(gap);
   *curvature = ratio * ratio - two * l - lane_all(4) * ratio;
   const lane first = -(two * gap * l + gap * ratio);
   *slope = first + *curvature * past;
@@ -159,12 +159,6 @@ LANE_INLINE lane lane_guard(lane stiffness, lane limit, const lane f[9], lane *p
 }
 
 // ---- stable neo-Hookean ------------------------------------------------------------------------
-
-LANE_INLINE lane lane_log1p(lane x) {
-  lane y;
-  for (int i = 0; i < 8; i++) y[i] = log1p(x[i]);
-  return y;
-}
 
 LANE_INLINE lane lane_neohookean_energy(lane lambda, lane mu, lane jac, const lane e[6]) {
   const lane one = lane_all(1), t = e[0] + e[1] + e[2];

@@ -12,9 +12,9 @@
 // Raised whenever a stage computes something else from the same input: old results are then not
 // found any more.
 static const int stage_version[] = {
-    [EP_STAGE_EIGEN] = 1, [EP_STAGE_MAP] = 5,   [EP_STAGE_POSES] = 4,    [EP_STAGE_MODES] = 1,
-    [EP_STAGE_PATHS] = 2, [EP_STAGE_BASIS] = 1, [EP_STAGE_CUBATURE] = 1, [EP_STAGE_GREEN] = 1,
-    [EP_STAGE_MODEL] = 6, [EP_STAGE_CUBIC] = 1, [EP_STAGE_TARGET] = 1,   [EP_STAGE_CONTACT] = 1,
+    [EP_STAGE_EIGEN] = 1, [EP_STAGE_MAP] = 5,    [EP_STAGE_POSES] = 4,    [EP_STAGE_MODES] = 1,
+    [EP_STAGE_PATHS] = 2, [EP_STAGE_BASIS] = 1,  [EP_STAGE_CUBATURE] = 1, [EP_STAGE_GREEN] = 1,
+    [EP_STAGE_MODEL] = 6, [EP_STAGE_CUBIC] = 1,  [EP_STAGE_TARGET] = 1,   [EP_STAGE_CONTACT] = 1,
     [EP_STAGE_FRAME] = 1, [EP_STAGE_GUARDS] = 1,
 };
 
@@ -370,22 +370,15 @@ static void plan_cubature(planner *p) {
 
 static void plan_guards(planner *p) {
   const ep_scene *scene = p->scene;
-  const ep_stage *cubature = ep_plan_find(p->plan, EP_STAGE_CUBATURE);
-  const int nt = p->shapes->shape[0].mesh.nt;
-  const char *reason = NULL;
-  if (scene->model == EP_STVK)
-    reason = "stvk without the volume penalty: nothing is kept from turning over";
-  else if (scene->guards == 0)
-    reason = "reduction.guards is 0";
-  else if (!cubature->runs || scene->elements >= nt)
-    reason = "every element resists turning over already";
-  if (reason) {
-    add(p, EP_STAGE_GUARDS, NULL, false, "%s", reason);
+  if (scene->model == EP_STVK || scene->guards == 0) {
+    add(p, EP_STAGE_GUARDS, NULL, false, "%s",
+        scene->guards ? "stvk does not keep elements from turning over; stvk-volume does"
+                      : "reduction.guards is 0");
     return;
   }
-  ep_stage *stage = add(p, EP_STAGE_GUARDS, NULL, true,
-                        "up to %d of the elements that turn over unseen when pushed hard",
-                        scene->guards);
+  ep_stage *stage =
+      add(p, EP_STAGE_GUARDS, NULL, true,
+          "up to %d of the elements that turn over unseen when pushed hard", scene->guards);
   ep_hash_text text = key_of(stage->kind);
   add_stage_key(p, &text, EP_STAGE_BASIS);
   add_stage_key(p, &text, EP_STAGE_CUBATURE);

@@ -100,13 +100,13 @@ static void the_green_strain_path_runs(void **state) {
 
 static void the_second_run_bakes_nothing(void **state) {
   (void)state;
-  static const char *const stages[] = {"eigen:object", "poses",    "modes", "paths",
-                                       "basis",        "cubature", "model"};
+  static const char *const stages[] = {"eigen:object", "poses",    "modes",  "paths",
+                                       "basis",        "cubature", "guards", "model"};
   json_t *root = run_scene("cache-a", "");
-  for (size_t i = 0; i < 7; i++) assert_true(cached(root, stages[i]));
+  for (size_t i = 0; i < 8; i++) assert_true(cached(root, stages[i]));
   json_decref(root);
   root = run_scene("cache-a", "--set reduction.elements=12");
-  for (size_t i = 0; i < 7; i++) assert_int_equal(cached(root, stages[i]), i < 5);
+  for (size_t i = 0; i < 8; i++) assert_int_equal(cached(root, stages[i]), i < 5);
   assert_true(number(root, "s") == 12);
   json_decref(root);
 }
@@ -116,7 +116,7 @@ static void two_bakes_are_byte_identical(void **state) {
   assert_int_equal(program("", "bake beam.yaml --cache cache-b --json"), 0);
   assert_int_equal(program("", "bake beam.yaml --cache cache-c --json"), 0);
   assert_int_equal(system("diff -r cache-b cache-c"), 0);
-  assert_int_equal(system("test $(ls cache-b | wc -l) -eq 7"), 0);
+  assert_int_equal(system("test $(ls cache-b | wc -l) -eq 8"), 0);
 }
 
 static void damaged_results_are_baked_again(void **state) {

@@ -99,6 +99,24 @@ static void choices_of_the_scene_leave_stages_out(void **state) {
   drop(&p);
 }
 
+// Guards: wherever the material keeps elements from turning over and the scene does not say 0.
+static void guards_where_there_is_a_penalty(void **state) {
+  (void)state;
+  static const struct {
+    const char *set;
+    int guards;
+  } cases[] = {{NULL, 1},
+               {"reduction.evaluator=cubic", 1},
+               {"object.material={model: neohookean}", 1},
+               {"object.material={model: stvk}", 0},
+               {"reduction.guards=0", 0}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    planned p = plan_of(OBJECT FIXED SMALL, cases[i].set);
+    assert_int_equal(running(&p, EP_STAGE_GUARDS), cases[i].guards);
+    drop(&p);
+  }
+}
+
 // Something fixed: no rigid frame, and its reason; nothing fixed: the frame, no other stage changes
 // its mind, and the results of the two are kept apart.
 static void only_free_objects_have_a_frame(void **state) {
@@ -202,6 +220,7 @@ enum {
   PATHS = 1 << EP_STAGE_PATHS,
   BASIS = 1 << EP_STAGE_BASIS,
   CUBATURE = 1 << EP_STAGE_CUBATURE,
+  GUARDS = 1 << EP_STAGE_GUARDS,
   MODEL = 1 << EP_STAGE_MODEL
 };
 
@@ -210,10 +229,11 @@ static void a_change_reaches_only_what_depends_on_it(void **state) {
   static const char text[] =
       OBJECT FIXED SMALL "families: [{rest: other.veg, poses: [third.veg]}]\n"
                          "loads: [{gravity: [0, 0, 1]}]\n";
-  const unsigned late = BASIS | CUBATURE | MODEL;
-  assert_int_equal(changed_by(text, "reduction.elements=20"), CUBATURE | MODEL);
-  assert_int_equal(changed_by(text, "reduction.amplitude=0.1"), CUBATURE | MODEL);
-  assert_int_equal(changed_by(text, "seed=5"), CUBATURE | MODEL);
+  const unsigned late = BASIS | CUBATURE | GUARDS | MODEL;
+  assert_int_equal(changed_by(text, "reduction.elements=20"), CUBATURE | GUARDS | MODEL);
+  assert_int_equal(changed_by(text, "reduction.amplitude=0.1"), CUBATURE | GUARDS | MODEL);
+  assert_int_equal(changed_by(text, "seed=5"), CUBATURE | GUARDS | MODEL);
+  assert_int_equal(changed_by(text, "reduction.guards=100"), GUARDS | MODEL);
   assert_int_equal(changed_by(text, "reduction.modes=7"), late);
   assert_int_equal(changed_by(text, "reduction.path_samples=2"), PATHS | late);
   assert_int_equal(changed_by(text, "reduction.linear_modes=4"), MODES | late);
@@ -261,6 +281,7 @@ int main(void) {
       cmocka_unit_test(what_is_not_needed_is_left_out),
       cmocka_unit_test(only_free_objects_have_a_frame),
       cmocka_unit_test(choices_of_the_scene_leave_stages_out),
+      cmocka_unit_test(guards_where_there_is_a_penalty),
       cmocka_unit_test(green_path_leaves_descriptors_out),
       cmocka_unit_test(a_region_changes_the_coefficients_only),
       cmocka_unit_test(impossible_scenes_are_refused),

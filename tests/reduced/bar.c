@@ -323,6 +323,47 @@ bar *bar_create(int nx, int ny, int nz, int r, int s, int m, int k, ep_material 
   return b;
 }
 
+void bar_add_guards(bar *b, int count, double limit) {
+  const size_t r = (size_t)b->model.size.r, width = 8 * (size_t)b->model.size.blocks;
+  const size_t guards = (size_t)count;
+  int32_t *tet = own(b, guards * sizeof *tet);
+  double *w = own(b, guards * sizeof *w), *stiffness = own(b, guards * sizeof *w);
+  double *limits = own(b, guards * sizeof *w), *packed = own(b, guards * 9 * width * sizeof *w);
+  double *growth = own(b, (guards + 7) / 8 * width * sizeof *w);
+  for (size_t i = 0; i < guards; i++) {
+    const size_t t = i * (size_t)b->model.size.nt / guards;
+    const double *g = b->g + 9 * t * r;
+    tet[i] = (int32_t)t;
+    w[i] = b->volume[t] * (double)(1 + i % 4);
+    stiffness[i] = 1e6 * (1 + 0.2 * (double)(i % 3));
+    limits[i] = limit * (1 - 0.02 * (double)(i % 6));
+    ep_pack_cubature((int)r, 1, g, packed + i * 9 * width);
+    for (size_t a = 0; a < r; a++) {
+      double square = 0;
+      for (size_t c = 0; c < 9; c++) square += g[c * r + a] * g[c * r + a];
+      growth[i / 8 * width + a] = fmax(growth[i / 8 * width + a], sqrt(square));
+    }
+  }
+  b->model.size.guards = count;
+  b->model.guard_tet = tet, b->model.guard_w = w, b->model.guard_stiffness = stiffness;
+  b->model.guard_limit = limits, b->model.guard_g = packed, b->model.guard_growth = growth;
+}
+
+int bar_inverted(const bar *b, const double *q) {
+  const int r = b->model.size.r;
+  int count = 0;
+  for (int t = 0; t < b->model.size.nt; t++) {
+    const double *g = b->g + 9 * (size_t)t * (size_t)r;
+    double f[9], inverse[9];
+    for (int c = 0; c < 9; c++) {
+      f[c] = c % 4 == 0;
+      for (int a = 0; a < r; a++) f[c] += g[c * r + a] * q[a];
+    }
+    count += !(invert(f, inverse) > 0);
+  }
+  return count;
+}
+
 void bar_free(bar *b) {
   for (int i = 0; i < b->owned_count; i++) free(b->owned[i]);
   free(b);

@@ -33,6 +33,13 @@ ep_state *bar_state(const bar *b, void **block);
 // The coefficients of the Green-strain path anew, after the examples or their number were changed.
 void bar_make_green(bar *b);
 
+// Guards (reduced/guard.h): `count` elements evenly spread over the mesh, of different weights,
+// stiffness and limits (`limit` and up to a tenth less).
+void bar_add_guards(bar *b, int count, double limit);
+
+// Elements of the whole mesh with J <= 0 at q.
+int bar_inverted(const bar *b, const double *q);
+
 // The plain sum over elements with the scalar laws: energy of the cubature with F_j B_j; f, k as in
 // ep_elastic_energy. inverse (s x 9) or NULL, weight (s).
 double bar_reference(const bar *b, const double *inverse, const double *weight, const double *q,

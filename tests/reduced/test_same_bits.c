@@ -66,6 +66,8 @@ static void cubature_with_examples(void **state) {
   double load[R];
   make_load(b, load);
   all_levels("cubature, two examples", &b->model, load);
+  bar_add_guards(b, 61, 0.9); // high enough that the load reaches them
+  all_levels("with guards", &b->model, load);
   bar_free(b);
 }
 

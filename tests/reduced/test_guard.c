@@ -1,0 +1,298 @@
+// Guards. Claims: their energy is sum_e w_e k_e b(J_e / limit_e) with b(x) = -(x - 1)^2 log x below
+// 1 and its parabola below the floor, C2; gradient and Hessian are its derivatives (central
+// differences, error ~ h^2), projected Hessians are positive semidefinite; what the state remembers
+// of where it looked changes no bit; an inverted object is driven back, a collapsed one too; of a
+// hard push on a bar of few cubature elements no tet of the whole mesh is inverted at any time (of
+// the hardest none once it ended), and without guards some are; nothing happens near rest.
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "reduced/state.h"
+#include "tests/reduced/bar.h"
+
+enum { R = 11, GUARDS = 21 };
+
+static double wall(double x) {
+  const double y = EP_GUARD_FLOOR, l = log(y), g = y - 1;
+  if (x >= 1) return 0;
+  if (x >= y) return -(x - 1) * (x - 1) * log(x);
+  const double slope = -(2 * g * l + g * g / y);
+  const double curvature = -2 * l - 4 * g / y + g * g / (y * y);
+  return -g * g * l + slope * (x - y) + 0.5 * curvature * (x - y) * (x - y);
+}
+
+static double jacobian(const bar *b, int guard, const double *q) {
+  const double *g = b->g + 9 * (size_t)b->model.guard_tet[guard] * R;
+  double f[9];
+  for (int c = 0; c < 9; c++) {
+    f[c] = c % 4 == 0;
+    for (int a = 0; a < R; a++) f[c] += g[c * R + a] * q[a];
+  }
+  return f[0] * (f[4] * f[8] - f[5] * f[7]) - f[1] * (f[3] * f[8] - f[5] * f[6]) +
+         f[2] * (f[3] * f[7] - f[4] * f[6]);
+}
+
+static double plain(const bar *b, const double *q) {
+  double sum = 0;
+  for (int i = 0; i < b->model.size.guards; i++)
+    sum += b->model.guard_w[i] * b->model.guard_stiffness[i] *
+           wall(jacobian(b, i, q) / b->model.guard_limit[i]);
+  return sum;
+}
+
+static double energy_of(ep_state *s, const double *q, double *f, double *h, int project) {
+  if (f) memset(f, 0, R * sizeof *f);
+  if (h) memset(h, 0, R * R * sizeof *h);
+  return ep_guard_add(s, q, f, h, project);
+}
+
+static bar *make(double limit) {
+  bar *b = bar_create(5, 2, 2, R, 9, 0, 0, EP_STVK_VOLUME);
+  bar_add_guards(b, GUARDS, limit);
+  return b;
+}
+
+// All three parts of the wall are met: above the limit, between, below the floor.
+static void is_the_sum_of_the_walls(void **state) {
+  (void)state;
+  bar *b = make(0.6);
+  void *block;
+  ep_state *s = bar_state(b, &block);
+  int above = 0, between = 0, below = 0;
+  for (int i = 0; i < 200; i++) {
+    double q[R];
+    bar_random_q(b, 0.02 * i, q);
+    const double expected = plain(b, q), found = energy_of(s, q, NULL, NULL, 0);
+    assert_true(fabs(found - expected) <= 1e-12 * expected); // sums of 21 positive numbers
+    for (int g = 0; g < GUARDS; g++) {
+      const double x = jacobian(b, g, q) / b->model.guard_limit[g];
+      above += x >= 1, below += x < EP_GUARD_FLOOR, between += x < 1 && x >= EP_GUARD_FLOOR;
+    }
+  }
+  assert_true(above > 100 && between > 100 && below > 100);
+  free(block);
+  bar_free(b);
+}
+
+static double error_of_gradient(ep_state *s, const double *q, const double *d, double h) {
+  double plus[R], minus[R], f[R], along = 0;
+  for (int a = 0; a < R; a++) plus[a] = q[a] + h * d[a], minus[a] = q[a] - h * d[a];
+  energy_of(s, q, f, NULL, 0);
+  for (int a = 0; a < R; a++) along += f[a] * d[a];
+  const double difference =
+      (energy_of(s, plus, NULL, NULL, 0) - energy_of(s, minus, NULL, NULL, 0)) / (2 * h);
+  return fabs(difference - along) / fabs(along);
+}
+
+static double error_of_hessian(ep_state *s, const double *q, const double *d, double h) {
+  double plus[R], minus[R], up[R], down[R], hessian[R * R], wrong = 0, whole = 0;
+  for (int a = 0; a < R; a++) plus[a] = q[a] + h * d[a], minus[a] = q[a] - h * d[a];
+  energy_of(s, q, up, hessian, 0);
+  energy_of(s, plus, up, NULL, 0);
+  energy_of(s, minus, down, NULL, 0);
+  for (int a = 0; a < R; a++) {
+    double along = 0;
+    for (int c = 0; c < R; c++) along += hessian[R * a + c] * d[c];
+    wrong += pow((up[a] - down[a]) / (2 * h) - along, 2), whole += along * along;
+  }
+  return sqrt(wrong / whole);
+}
+
+// One guard alone, within one part of the wall (its third derivative jumps between them).
+static void derivatives_are_right(void **state) {
+  (void)state;
+  bar *b = bar_create(5, 2, 2, R, 9, 0, 0, EP_STVK_VOLUME);
+  bar_add_guards(b, 1, 0.6);
+  void *block;
+  ep_state *s = bar_state(b, &block);
+  int parts[2] = {0, 0};
+  for (int i = 0; i < 400 && (parts[0] < 5 || parts[1] < 5); i++) {
+    double q[R], d[R];
+    bar_random_q(b, 0.03 * i, q);
+    bar_random_q(b, 1, d);
+    const double x = jacobian(b, 0, q) / b->model.guard_limit[0];
+    const int part = x < 0 ? 1 : x > 0.1 && x < 0.9 ? 0 : -1;
+    if (part < 0) continue;
+    const double h = 2e-3 * (part ? 1 : 0.5);
+    const double order = log2(error_of_gradient(s, q, d, h) / error_of_gradient(s, q, d, h / 2));
+    const double second = log2(error_of_hessian(s, q, d, h) / error_of_hessian(s, q, d, h / 2));
+    assert_true(fabs(order - 2) < 0.1 && fabs(second - 2) < 0.1);
+    parts[part]++;
+  }
+  assert_true(parts[0] >= 5 && parts[1] >= 5);
+  free(block);
+  bar_free(b);
+}
+
+// Where the parts meet, slope and curvature go on: from both sides the same.
+static void parts_meet_smoothly(void **state) {
+  (void)state;
+  static const double at[2] = {1, EP_GUARD_FLOOR};
+  for (int i = 0; i < 2; i++) {
+    const double x = at[i], h = 1e-5 * x;
+    const double left = (wall(x) - 2 * wall(x - h) + wall(x - 2 * h)) / (h * h);
+    const double right = (wall(x) - 2 * wall(x + h) + wall(x + 2 * h)) / (h * h);
+    assert_true(fabs(left - right) <= 1e-3 * (1 + fabs(right))); // differences: O(h)
+    assert_true(fabs((wall(x + h) - wall(x)) - (wall(x) - wall(x - h))) <=
+                1.1 * h * h * fmax(1e-2, fmax(fabs(left), fabs(right))));
+  }
+}
+
+static void projection_is_semidefinite(void **state) {
+  (void)state;
+  bar *b = make(0.6);
+  void *block;
+  ep_state *s = bar_state(b, &block);
+  int indefinite = 0;
+  for (int i = 0; i < 50; i++) {
+    double q[R], h[R * R], l[R * R], size = 0;
+    bar_random_q(b, 0.05 * i, q);
+    if (energy_of(s, q, NULL, h, 0) == 0) continue;
+    for (int a = 0; a < R; a++) size = fmax(size, fabs(h[(R + 1) * a]));
+    for (int a = 0; a < R; a++) h[(R + 1) * a] += 1e-9 * size;
+    indefinite += !ep_cholesky(R, h, l);
+    energy_of(s, q, NULL, h, 1);
+    for (int a = 0; a < R; a++) h[(R + 1) * a] += 1e-9 * size; // round-off of the sums
+    assert_true(ep_cholesky(R, h, l));
+  }
+  assert_true(indefinite > 10); // the projection had something to do
+  free(block);
+  bar_free(b);
+}
+
+// Wander in small steps and far jumps: each time the same bits as a state that never looked.
+static void memory_changes_nothing(void **state) {
+  (void)state;
+  bar *b = make(0.5);
+  void *block, *fresh_block;
+  ep_state *s = bar_state(b, &block);
+  double q[R] = {0}, step[R], f[R], h[R * R], fresh_f[R], fresh_h[R * R];
+  int acted = 0, passed = 0;
+  for (int i = 0; i < 600; i++) {
+    bar_random_q(b, i % 97 == 96 ? 1.5 : 0.05, step);
+    for (int a = 0; a < R; a++) q[a] = (i % 97 == 0 ? 0 : q[a]) + step[a];
+    const double energy = energy_of(s, q, f, h, 0);
+    ep_state *fresh = bar_state(b, &fresh_block);
+    assert_true(energy_of(fresh, q, fresh_f, fresh_h, 0) == energy);
+    assert_memory_equal(f, fresh_f, sizeof f);
+    assert_memory_equal(h, fresh_h, sizeof h);
+    for (int g = 0; g < (GUARDS + 7) / 8; g++) // looked at before, not now
+      passed += memcmp(s->guard_at + g * R, q, sizeof q) != 0;
+    acted += energy > 0;
+    free(fresh_block);
+  }
+  assert_true(acted > 50 && passed > 200);
+  free(block);
+  bar_free(b);
+}
+
+static void rest_is_untouched(void **state) {
+  (void)state;
+  bar *b = make(0.3);
+  void *block;
+  ep_state *s = bar_state(b, &block);
+  double q[R], f[R], h[R * R];
+  const double nothing[R * R] = {0};
+  bar_random_q(b, 0.1, q);
+  assert_true(energy_of(s, q, f, h, 0) == 0);
+  assert_memory_equal(f, nothing, sizeof f);
+  assert_memory_equal(h, nothing, sizeof h);
+  free(block);
+  bar_free(b);
+}
+
+// ---- in steps ----------------------------------------------------------------------------------
+
+enum { PUSHED = 30, FREE = 90 };
+
+// Largest number of inverted tets while pushed, and that at the end.
+static void push(const bar *b, const double *start, const double *load, int *most, int *left) {
+  void *block;
+  ep_state *s = bar_state(b, &block);
+  ep_step_def def = ep_default_step();
+  def.damping_stiffness = 0.02;
+  *most = 0;
+  if (start) memcpy(ep_state_q(s), start, (size_t)b->model.size.r * sizeof *start);
+  for (int step = 0; step < PUSHED + FREE; step++) {
+    def.force = step < PUSHED ? load : NULL;
+    assert_int_equal(ep_step(s, &def, NULL), EP_OK);
+    *left = bar_inverted(b, ep_state_q(s));
+    if (step<PUSHED && * left> * most) *most = *left;
+  }
+  free(block);
+}
+
+// Force on the far end against the axis and aside, spread over its vertices.
+static void end_load(const bar *b, double newton, double *load) {
+  const size_t r = (size_t)b->model.size.r, n = (size_t)b->model.size.n;
+  memset(load, 0, r * sizeof *load);
+  for (size_t a = 0; a < r; a++)
+    for (size_t v = 0; v < n; v++)
+      if (b->model.rest_x[3 * v] > 3.9)
+        load[a] -= newton * (b->model.u[(a * n + v) * 3] + 0.3 * b->model.u[(a * n + v) * 3 + 1]);
+}
+
+static void a_hard_push_inverts_nothing(void **state) {
+  (void)state;
+  for (int k = 0; k < 3; k++) {
+    bar *b = bar_create(8, 3, 3, 20, 12, 0, 0, EP_STVK_VOLUME);
+    double load[20];
+    int most, left;
+    end_load(b, 1e4 * pow(10, k), load); // 4 t of bar: .25, 2.5 and 25 times its weight
+    push(b, NULL, load, &most, &left);
+    assert_true(most > 10); // without guards
+    if (k == 2) assert_true(left > 0);
+    bar_add_guards(b, b->model.size.nt, 0.3);
+    push(b, NULL, load, &most, &left);
+    if (k < 2) assert_int_equal(most, 0);
+    assert_int_equal(left, 0);
+    bar_free(b);
+  }
+}
+
+// U q nearest to the mirror image (factor -2), to a plane (-1) across the bar's axis.
+static void nearest(const bar *b, double factor, double *q) {
+  const size_t r = (size_t)b->model.size.r, n = (size_t)b->model.size.n;
+  for (size_t a = 0; a < r; a++) {
+    q[a] = 0;
+    for (size_t v = 0; v < n; v++)
+      for (int t = 0; t < b->model.size.nt; t++) // lumped mass
+        for (int i = 0; i < 4; i++)
+          if ((size_t)b->model.tets[4 * t + i] == v)
+            q[a] += 1000 * b->volume[t] / 4 * b->model.u[(a * n + v) * 3] * factor *
+                    b->model.rest_x[3 * v];
+  }
+}
+
+static void inverted_starts_recover(void **state) {
+  (void)state;
+  for (int factor = 1; factor <= 2; factor++) {
+    bar *b = bar_create(8, 3, 3, 20, 12, 0, 0, EP_STVK_VOLUME);
+    double q[20];
+    int most, left;
+    bar_add_guards(b, b->model.size.nt, 0.3);
+    nearest(b, -factor, q);
+    assert_true(bar_inverted(b, q) > b->model.size.nt / 10);
+    push(b, q, NULL, &most, &left);
+    assert_int_equal(left, 0);
+    bar_free(b);
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(is_the_sum_of_the_walls),     cmocka_unit_test(derivatives_are_right),
+      cmocka_unit_test(parts_meet_smoothly),         cmocka_unit_test(projection_is_semidefinite),
+      cmocka_unit_test(memory_changes_nothing),      cmocka_unit_test(rest_is_untouched),
+      cmocka_unit_test(a_hard_push_inverts_nothing), cmocka_unit_test(inverted_starts_recover),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
