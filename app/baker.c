@@ -1,6 +1,7 @@
 // The baker: commands that need PETSc and SLEPc. Run by `eigenpose`, or by hand with the same
 // arguments.
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "app/blas_core.h"
 #include "app/commands.h"
@@ -11,16 +12,28 @@
 
 // ---- bake ------------------------------------------------------------------------------------
 
+// For an engine: the model under a name of its own.
+static ep_status copy_model(const char *from, const char *to, ep_error *err) {
+  char *bytes;
+  size_t size;
+  EP_TRY(ep_file_read(from, &bytes, &size, err));
+  const ep_status status = ep_file_write(to, bytes, size, err);
+  free(bytes);
+  return status;
+}
+
 static ep_status command_bake(const ep_cli *cli, ep_session *session, ep_bake *bake,
                               ep_error *err) {
   char path[EP_PATH_MAX];
   EP_TRY(ep_bake_model(bake, path, err));
+  if (cli->out) EP_TRY(copy_model(path, cli->out, err));
   EP_TRY(ep_bake_poses(bake, err)); // for the report: a model in the cache does not ask for them
   if (session->shapes.sets) EP_TRY(ep_bake_cubature(bake, err)); // the same
   if (cli->json) {
-    json_t *report = json_pack("{s:s, s:s, s:i, s:o, s:o}", "scene", session->scene.name, "model",
-                               path, "warnings", session->log.warnings, "stages",
-                               ep_report_stages(&session->plan), "examples", ep_poses_json(bake));
+    json_t *report =
+        json_pack("{s:s, s:s, s:i, s:o, s:o}", "scene", session->scene.name, "model",
+                  cli->out ? cli->out : path, "warnings", session->log.warnings, "stages",
+                  ep_report_stages(&session->plan), "examples", ep_poses_json(bake));
     if (report && session->shapes.sets)
       json_object_set_new(report, "regions", ep_regions_json(bake));
     return ep_report_print(report, err);
@@ -31,7 +44,7 @@ static ep_status command_bake(const ep_cli *cli, ep_session *session, ep_bake *b
       printf("%-30s %8.3f s%s\n", stage->name, stage->seconds, stage->cached ? "  (cached)" : "");
   }
   ep_regions_text(stdout, bake);
-  printf("model: %s\n", path);
+  printf("model: %s\n", cli->out ? cli->out : path);
   return EP_OK;
 }
 

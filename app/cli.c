@@ -84,7 +84,11 @@ static const struct argp_option report_options[] = {
     OPTION_JSON,
     OPTION_QUIET,
     {0}};
-static const struct argp_option scene_options[] = {
+static const struct argp_option plan_options[] = {
+    OPTION_JSON, OPTION_QUIET, OPTION_SET, OPTION_CACHE, {0}};
+static const struct argp_option bake_options[] = {
+    {"out", KEY_OUT, "FILE", 0,
+     "Copy the model there (.epm), for an engine that embeds the run time", 0},
     OPTION_JSON,
     OPTION_QUIET,
     OPTION_SET,
@@ -144,9 +148,9 @@ static const struct {
                           align_options},
     [EP_COMMAND_PLAN] = {"plan", "SCENE",
                          "Print which stages a scene needs, which are left out, and why.",
-                         scene_options},
+                         plan_options},
     [EP_COMMAND_BAKE] = {"bake", "SCENE",
-                         "Compute everything a run needs and keep it in the cache.", scene_options},
+                         "Compute everything a run needs and keep it in the cache.", bake_options},
     [EP_COMMAND_COMPARE] = {"compare", "SCENE",
                             "Simulate a scene by every method and setting of its `compare` section "
                             "and report error against run time: a page, its chart, tables. "

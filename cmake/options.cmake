@@ -1,6 +1,8 @@
 # Flags every target shares. -ffp-contract=off: results must not depend on whether a compiler
-# fuses a multiply and an add on its own (DESIGN: builds that must agree).
-add_compile_options(-Wall -Wextra -Wshadow -Wstrict-prototypes -Wmissing-prototypes
+# fuses a multiply and an add on its own: all builds give the same bits.
+add_compile_options(-Wall -Wextra -Wshadow
+                    $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes> # the examples are C++ too
+                    $<$<COMPILE_LANGUAGE:C>:-Wmissing-prototypes>
                     -Wpointer-arith -Wvla -Wundef -fno-math-errno -ffp-contract=off)
 if(EP_WERROR)
   add_compile_options(-Werror)
@@ -17,7 +19,7 @@ if(EP_SANITIZE_THREAD)
   add_compile_options(-fsanitize=thread -fno-omit-frame-pointer -g)
   add_link_options(-fsanitize=thread)
 endif()
-include_directories(${CMAKE_SOURCE_DIR})
+include_directories(${PROJECT_SOURCE_DIR})
 
 # A static library of one folder; headers are included as "folder/name.h".
 function(ep_library name)

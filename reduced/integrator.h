@@ -9,6 +9,10 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum ep_integrator {
   EP_IMPLICIT_EULER, // order 1, damps
   EP_NEWMARK,        // Newmark 1959 with gamma 1/2, beta 1/4 (average acceleration): order 2, no
@@ -33,4 +37,7 @@ typedef struct ep_motion {
 void ep_integrator_predict(ep_integrator kind, size_t n, double dt, const ep_motion *motion,
                            double *base, double *ahead, double *rate, double *inertia);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

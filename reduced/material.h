@@ -3,6 +3,10 @@
 #ifndef EP_REDUCED_MATERIAL_H
 #define EP_REDUCED_MATERIAL_H
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum ep_material {
   EP_STVK,              // psi = lambda/2 tr(E)^2 + mu E:E, E = (F^T F - I)/2
   EP_STVK_VOLUME,       // the same plus k/2 min(0, J - 0.5)^2, k = 10 max(lambda, mu): DESIGN
@@ -35,4 +39,7 @@ void ep_material_rotation(const double f[9], double r[9]);
 // NULL outside the enumeration.
 const char *ep_material_name(ep_material model);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -5,6 +5,10 @@
 
 #include "reduced/frame.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum ep_obstacle_kind {
   EP_OBSTACLE_PLANE,  // half-space: local z <= 0 is solid
   EP_OBSTACLE_SPHERE, // centre at the local origin
@@ -43,4 +47,7 @@ double ep_obstacle_inner_radius(const ep_obstacle *obstacle);
 int ep_obstacle_entry(const ep_obstacle *obstacle, const double from[3], const double to[3],
                       double normal[3], double *offset);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

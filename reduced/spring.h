@@ -5,6 +5,10 @@
 
 #include "reduced/eigenpose.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 // Energy k/2 |p - b|^2 + c/(2 dt) |(p - p_0) - (b - b_0)|^2 of the centre p = sum_i w_i x_i, sum w
 // = 1, and the point b it is dragged to; p_0, b_0: at the beginning of the step. A held object:
 // p = rest + rows q; a free one: p = c + R (rest - X_0 + rows q).
@@ -31,4 +35,7 @@ void ep_springs_begin(const ep_state *state, double dt, ep_springs *springs);
 double ep_springs_energy(void *springs, const ep_state *state, const ep_frame *frame,
                          const double *q, double *g, double *h, int n);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -9,6 +9,10 @@
 
 #include "base/status.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum ep_dtype { EP_F64, EP_F32, EP_I32, EP_I64, EP_U8, EP_DTYPES } ep_dtype;
 
 typedef struct ep_tensor {
@@ -35,4 +39,7 @@ ep_status ep_tensorfile_find(const ep_tensorfile *file, const char *name, ep_ten
 ep_status ep_tensorfile_metadata(const ep_tensorfile *file, const char *key, char *text,
                                  size_t capacity);
 
+#ifdef __cplusplus
+}
+#endif
 #endif
