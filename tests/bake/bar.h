@@ -29,6 +29,15 @@
     if (!(a_ < b_)) fail_msg("%s = %.6g is not below %s = %.6g", #a, a_, #b, b_);                  \
   } while (0)
 
+// In doubles: cmocka's assert_float_equal compares in floats, to 6e-8 at best.
+#define ASSERT_NEAR(a, b, tolerance)                                                               \
+  do {                                                                                             \
+    double a_ = (a), b_ = (b), t_ = (tolerance);                                                   \
+    if (!(fabs(a_ - b_) <= t_))                                                                    \
+      fail_msg("%s = %.17g and %s = %.17g are %.3g apart, above %.3g", #a, a_, #b, b_,             \
+               fabs(a_ - b_), t_);                                                                 \
+  } while (0)
+
 typedef struct bar {
   ep_mesh mesh;
   ep_fem fem;

@@ -107,7 +107,7 @@ static void test_planted(void **state) {
   make_gram(&p);
   ASSERT_OK(ep_nnls_gram(p.n, p.g, p.c, x, err));
   // cond(A) ~ 1e2 from the lengths times ~ 10, squared in the Gram form: 1e-16 * 1e6.
-  for (int j = 0; j < p.n; j++) assert_float_equal(x[j], planted[j], 1e-8);
+  for (int j = 0; j < p.n; j++) ASSERT_NEAR(x[j], planted[j], 1e-8);
 }
 
 // Least squares over one support by the same factor; infinity where it leaves x >= 0.
@@ -140,7 +140,7 @@ static void test_brute_force(void **state) {
     for (unsigned support = 0; support < 1u << p.n; support++)
       best = fmin(best, support_objective(&p, support));
     ASSERT_OK(ep_nnls_gram(p.n, p.g, p.c, x, err));
-    assert_float_equal(objective(&p, x), best, 1e-11 * best);
+    ASSERT_NEAR(objective(&p, x), best, 1e-11 * best);
   }
 }
 
@@ -209,7 +209,7 @@ static void test_updated_factor(void **state) {
       for (int k = 0; k <= j; k++) sum += l[i * p.n + k] * l[j * p.n + k];
       const double exact = p.g[set.index[i] * p.n + set.index[j]];
       const double size = sqrt(p.g[set.index[i] * (p.n + 1)] * p.g[set.index[j] * (p.n + 1)]);
-      assert_float_equal(sum / size, exact / size, 1e-12); // 400 rotations of round-off
+      ASSERT_NEAR(sum / size, exact / size, 1e-12); // 400 rotations of round-off
     }
   ep_passive_free(&set);
 }
@@ -243,7 +243,7 @@ static void test_r_oracle(void **state) {
   for (int j = 0; j < p.n; j++) {
     double theirs;
     assert_int_equal(fscanf(file, "%lf", &theirs), 1);
-    assert_float_equal(x[j], theirs, 1e-9 * (1 + fabs(theirs)));
+    ASSERT_NEAR(x[j], theirs, 1e-9 * (1 + fabs(theirs)));
   }
   fclose(file);
 }

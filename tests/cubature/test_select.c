@@ -55,7 +55,7 @@ static void test_gram_columns(void **state) {
   ASSERT_OK(ep_gram_need(&gram, 11, wanted, err));
   for (int k = 0; k < 11; k++)
     for (int e = 0; e < N; e++)
-      assert_float_equal(gram.column[wanted[k]][e], product(&gram, e, wanted[k]), 1e-13);
+      ASSERT_NEAR(gram.column[wanted[k]][e], product(&gram, e, wanted[k]), 1e-13);
   assert_null(gram.column[4]);
   ep_gram_free(&gram);
 }
@@ -76,7 +76,7 @@ static void test_planted(void **state) {
     const int e = set.index[k];
     assert_int_equal(e % 7, 3);
     const double weight = set.x[k] / gram.norm[e] * (1 + e % 5);
-    assert_float_equal(weight, 1 + (e / 7) % 3, 1e-9);
+    ASSERT_NEAR(weight, 1 + (e / 7) % 3, 1e-9);
   }
   ep_passive_free(&set);
   ep_gram_free(&gram);
@@ -93,14 +93,14 @@ static void test_growth(void **state) {
     ASSERT_OK(ep_select_grow(&gram, &all, size, &set, err));
     assert_int_equal(set.count, size);
     const double residual = ep_selection_residual(&gram, &set);
-    assert_float_equal(residual, true_residual(&gram, &set), 1e-12);
+    ASSERT_NEAR(residual, true_residual(&gram, &set), 1e-12);
     ASSERT_LESS(residual, before);
     before = residual;
     for (int k = 0; k < set.count; k++) { // stationary, and inside the bounds
       double w = gram.c[set.index[k]];
       for (int m = 0; m < set.count; m++)
         w -= product(&gram, set.index[k], set.index[m]) * set.x[m];
-      assert_float_equal(w / sqrt(gram.squared), 0, 1e-12);
+      ASSERT_NEAR(w / sqrt(gram.squared), 0, 1e-12);
       assert_true(set.x[k] > 0);
     }
   }
@@ -148,7 +148,7 @@ static void test_prune(void **state) {
   }
   ASSERT_OK(ep_select_prune(&gram, 24, &set, err));
   assert_int_equal(set.count, 24);
-  assert_float_equal(true_residual(&gram, &set), best, 1e-12);
+  ASSERT_NEAR(true_residual(&gram, &set), best, 1e-12);
   ep_passive_free(&set);
   ep_passive_free(&trial);
   ep_gram_free(&gram);
@@ -196,9 +196,9 @@ static void test_bad_input(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_gram_columns),   cmocka_unit_test(test_planted),
-      cmocka_unit_test(test_growth),         cmocka_unit_test(test_exchange),
-      cmocka_unit_test(test_prune),          cmocka_unit_test(test_pool),
+      cmocka_unit_test(test_gram_columns), cmocka_unit_test(test_planted),
+      cmocka_unit_test(test_growth),       cmocka_unit_test(test_exchange),
+      cmocka_unit_test(test_prune),        cmocka_unit_test(test_pool),
       cmocka_unit_test(test_bad_input),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
