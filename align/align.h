@@ -50,6 +50,12 @@ typedef struct ep_region_quality {
   bool suspect;                           // best_match differs, or the robust weight gave it up
 } ep_region_quality;
 
+// A landmark seen from the others: where the map they give without it sends its vertex.
+typedef struct ep_landmark_quality {
+  double held_out; // distance of that image to its partner, over the rms radius; -1: not tried
+  int best_match;  // landmark whose partner is clearly nearer to it, else its own number
+} ep_landmark_quality;
+
 // One frame the map was tried in.
 typedef struct ep_frame_candidate {
   char name[32];      // "authored", "landmarks", "regions", "axes", "axes, half turn about x", ..
@@ -62,6 +68,8 @@ typedef struct ep_frame_candidate {
   double landmark;    // rms distance of the landmarks in this frame over the rms radius; -1 without
   int rounds;         // how often it was turned to what its map said
   bool chosen, rival; // the map's own frame; another one that is not clearly worse
+  bool alone;         // tried without landmarks and regions, as a second opinion
+  bool against;       // contradicts the choice: it fits clearly better, or as well as authored
 } ep_frame_candidate;
 
 typedef struct ep_map_quality {
@@ -72,6 +80,7 @@ typedef struct ep_map_quality {
   double determinant;                     // of A, +-1
   double coverage;                        // share of the example's volume hit by the map
   double cycle;                           // round trip rms / radius of gyration; -1 where not made
+  double handed;     // share of the volume around whose vertices the map keeps left and right
   double dirichlet;  // of the transferred coordinates over that of the own ones
   int near_multiple; // eigenfunctions in near-multiple groups at the cut or inside
   int reframe_rounds;
@@ -82,9 +91,14 @@ typedef struct ep_map_quality {
   int coupling_k;            // chosen by held-out regions, with mu; 0 without regions
   double coupling_mu, held_out; // relative residual of the regions left out, each in its turn
   int landmarks;
+  ep_landmark_quality *landmark; // (landmarks) or NULL; tried with five and more
   double landmark_residual;      // rms of image to partner over the rms radius; 0 without landmarks
-  int candidates, rivals;        // frames tried; of those, rivals of the chosen one
-  ep_frame_candidate *candidate; // (candidates), authored frame first
+  int candidates, rivals, against; // frames tried; of those, rivals of the chosen one and those
+                                   // that contradict it
+  ep_frame_candidate *candidate;   // (candidates), authored frame first
+  // Landmarks (where there are any, else regions), by number, that by the shapes alone seem to have
+  // each other's partner; -1 where none do.
+  int exchanged, exchanged_with;
   // The landmark that would settle the choice: vertex of `from` and where the chosen frame and the
   // rival take it; -1 where the choice is clear.
   int settle_from, settle_to, settle_other;

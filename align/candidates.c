@@ -16,7 +16,7 @@ void ep_candidates_free(ep_candidates *c) {
   memset(c, 0, sizeof *c);
 }
 
-static void add(ep_candidates *c, const double r[9], const char *name) {
+void ep_candidates_add(ep_candidates *c, const double r[9], const char *name) {
   if (c->count == EP_CANDIDATES_MAX) return;
   ep_frame_candidate *f = &c->frame[c->count++];
   memset(f, 0, sizeof *f);
@@ -58,12 +58,12 @@ static void add_axes(ep_candidates *c, const double vf[9], const double vt[9], i
     static const int order[4] = {0, 2, 1, 3};
     snprintf(name, sizeof name, "%s%s%s", mirrored ? "mirror " : "", flip_name(order[flip]),
              swap >= 0 ? swapped[swap] : "");
-    add(c, r, name);
+    ep_candidates_add(c, r, name);
   }
 }
 
-static ep_status add_all_axes(ep_candidates *c, const ep_side *from, const ep_side *to,
-                              bool mirrored, ep_error *err) {
+ep_status ep_candidates_add_axes(ep_candidates *c, const ep_side *from, const ep_side *to,
+                                 bool mirrored, ep_error *err) {
   // Axes whose lengths differ by less may be exchanged between shapes: own choice.
   static const double NEAR_LENGTH = 1.25;
   double vf[9], vt[9], lf[3], lt[3];
@@ -109,7 +109,7 @@ static ep_status add_landmarks(ep_candidates *c, const ep_side *from, const ep_s
   double r[9];
   bool spread;
   EP_TRY(frame_from_marks(from, to, r, &spread, err));
-  add(c, r, "landmarks");
+  ep_candidates_add(c, r, "landmarks");
   if (spread) return EP_OK;
   // A single direction is given: turn about it. The heaviest landmark's direction stands for it.
   const double *x = from->mark_x;
@@ -128,7 +128,7 @@ static ep_status add_landmarks(ep_candidates *c, const ep_side *from, const ep_s
     axis_turn(axis, 2 * acos(-1) * t / TURNS, turn);
     ep_frame_multiply(turn, r, turned);
     snprintf(name, sizeof name, "landmarks, turned by %d", 360 * t / TURNS);
-    add(c, turned, name);
+    ep_candidates_add(c, turned, name);
   }
   return EP_OK;
 }
@@ -137,21 +137,21 @@ static ep_status start_frames(const ep_side *from, const ep_side *to, const ep_m
                               const ep_map_options *o, ep_candidates *c, ep_error *err) {
   double r[9];
   ep_frame_identity(r);
-  add(c, r, "authored");
+  ep_candidates_add(c, r, "authored");
   if (o->keep_frame) return EP_OK;
   bool found = false;
   if (rule->region_weight > 0) EP_TRY(ep_frame_from_regions(from, to, rule->use, r, &found, err));
-  if (found) add(c, r, "regions");
+  if (found) ep_candidates_add(c, r, "regions");
   if (found) c->preferred = 1;
   if (found) return EP_OK;
   if (o->same_family) {
     EP_TRY(ep_frame_from_axes(from, to, r, err));
-    if (ep_frame_angle(r) > 5) add(c, r, "axes");
+    if (ep_frame_angle(r) > 5) ep_candidates_add(c, r, "axes");
     return EP_OK;
   }
   if (from->marks) EP_TRY(add_landmarks(c, from, to, err));
-  EP_TRY(add_all_axes(c, from, to, false, err));
-  if (o->reflections) EP_TRY(add_all_axes(c, from, to, true, err));
+  EP_TRY(ep_candidates_add_axes(c, from, to, false, err));
+  if (o->reflections) EP_TRY(ep_candidates_add_axes(c, from, to, true, err));
   return EP_OK;
 }
 
@@ -212,8 +212,8 @@ static double score_of(const ep_frame_candidate *f, double commuting, double iso
   return f->landmark >= 0 ? mean * (0.1 + f->landmark) : mean;
 }
 
-static ep_status try_frame(const ep_side *from, const ep_side *to, const ep_match_rule *full,
-                           int rounds, ep_candidates *c, int which, ep_error *err) {
+ep_status ep_candidates_run(const ep_side *from, const ep_side *to, const ep_match_rule *full,
+                            int rounds, ep_candidates *c, int which, ep_error *err) {
   ep_match_rule steep = *full;
   const ep_match_rule *rule = &steep;
   steep.step = 3; // enough to tell frames apart
@@ -248,7 +248,7 @@ static bool worth_trying(const ep_candidates *c, int which, double best_mark, co
   return !from->marks || mark_distance(from, to, f->rotation) <= 2 * best_mark + 0.3;
 }
 
-static void drop(ep_candidates *c, int which) {
+void ep_candidates_drop(ep_candidates *c, int which) {
   free(c->p[which]);
   for (int i = which; i + 1 < c->count; i++) {
     c->frame[i] = c->frame[i + 1];
@@ -258,7 +258,8 @@ static void drop(ep_candidates *c, int which) {
 }
 
 // Rms distance of the images of two maps over to's rms radius.
-static double difference(const ep_side *from, const ep_side *to, const int *p, const int *q) {
+double ep_candidates_difference(const ep_side *from, const ep_side *to, const int *p,
+                                const int *q) {
   double sum = 0;
   for (int i = 0; i < from->n; i++)
     for (int c = 0; c < 3; c++)
@@ -268,12 +269,7 @@ static double difference(const ep_side *from, const ep_side *to, const int *p, c
 
 // Choose, and mark the rivals: other maps whose score is not clearly worse.
 static void choose(const ep_side *from, const ep_side *to, bool settled, ep_candidates *c) {
-  // A score is clearly better by this factor: right frames of shapes without symmetry were 1.5 to
-  // 2.5 times better than any flip, those of near-symmetric shapes 0.8 to 1.2 (own measurement,
-  // bench_maps and data/).
-  static const double CLEARLY = 1.4;
-  static const double TURNED = 45;     // degrees
-  static const double SAME_MAP = 0.35; // a flip moves points by the radius and more
+  static const double TURNED = 45; // degrees
   int best = 0;
   for (int i = 1; i < c->count; i++)
     if (c->frame[i].score < c->frame[best].score) best = i;
@@ -281,14 +277,14 @@ static void choose(const ep_side *from, const ep_side *to, bool settled, ep_cand
   // landmarks say more.
   const bool stands = c->frame[c->preferred].reflected == false &&
                       ep_frame_angle(c->frame[c->preferred].rotation) < TURNED;
-  const double margin = from->marks || (c->preferred == 0 && !stands) ? 1 : CLEARLY;
+  const double margin = from->marks || (c->preferred == 0 && !stands) ? 1 : EP_FRAME_CLEARLY;
   c->chosen = c->frame[c->preferred].score <= margin * c->frame[best].score ? c->preferred : best;
   ep_frame_candidate *chosen = &c->frame[c->chosen];
   chosen->chosen = true;
   for (int i = 0; i < c->count && !settled; i++) {
     ep_frame_candidate *f = &c->frame[i];
-    if (i == c->chosen || f->score >= CLEARLY * chosen->score) continue;
-    f->rival = difference(from, to, c->p[i], c->p[c->chosen]) > SAME_MAP;
+    if (i == c->chosen || f->score >= EP_FRAME_CLEARLY * chosen->score) continue;
+    f->rival = ep_candidates_difference(from, to, c->p[i], c->p[c->chosen]) > EP_FRAME_SAME;
     c->rivals += f->rival;
   }
 }
@@ -330,9 +326,9 @@ ep_status ep_candidates_try(const ep_side *from, const ep_side *to, const ep_mat
     best_mark = fmin(best_mark, mark_distance(from, to, c->frame[i].rotation));
   for (int i = 0; i < c->count && status == EP_OK; i++)
     if (i == 0 || worth_trying(c, i, best_mark, from, to))
-      status = try_frame(from, to, rule, rounds, c, i, err);
+      status = ep_candidates_run(from, to, rule, rounds, c, i, err);
     else
-      drop(c, i--);
+      ep_candidates_drop(c, i--);
   if (status != EP_OK) {
     ep_candidates_free(c);
     return status;
@@ -340,5 +336,7 @@ ep_status ep_candidates_try(const ep_side *from, const ep_side *to, const ep_mat
   if (c->preferred >= c->count) c->preferred = 0;
   choose(from, to, o->keep_frame || o->same_family || rule->region_weight > 0, c);
   find_settling(from, to, c);
-  return EP_OK;
+  status = ep_candidates_second_opinion(from, to, rule, o, c, err);
+  if (status != EP_OK) ep_candidates_free(c);
+  return status;
 }

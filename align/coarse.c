@@ -49,6 +49,12 @@ static double *rows_of(int count, const int *row, int width, const double *in) {
   return out;
 }
 
+static double *square_of(int count, const double *in) {
+  double *out = malloc((size_t)count * count * sizeof *out);
+  if (out) memcpy(out, in, (size_t)count * count * sizeof *out);
+  return out;
+}
+
 // mphi = W Phi G^-1 with the constant among the functions, G their Gram matrix on the samples:
 // mphi^T phi = I and mphi^T 1 = 0.
 static ep_status dual_functions(ep_side *c, ep_error *err) {
@@ -101,6 +107,10 @@ static ep_status fill(const ep_side *side, const int *sample, const int *owner, 
     out->mark_x = malloc(3 * (size_t)side->marks * sizeof(double));
     out->mark_near = malloc((size_t)side->marks * sizeof(int));
     good = good && out->mark && out->mark_x && out->mark_near;
+    if (side->mark_gram) {
+      out->mark_gram = square_of(side->marks, side->mark_gram);
+      good = good && out->mark_gram;
+    }
   }
   if (!good) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d samples", n);
   for (int i = 0; i < side->n; i++) out->share[owner[i]] += side->share[i];
@@ -113,7 +123,7 @@ ep_status ep_side_coarsen(const ep_side *side, int count, ep_side *out, int *sam
                           ep_error *err) {
   *out = *side;
   out->x = out->phi = out->mphi = out->share = out->indicator = out->region = NULL;
-  out->mark = out->mark_x = out->skin = NULL;
+  out->mark = out->mark_x = out->mark_gram = out->skin = NULL;
   out->mark_near = NULL;
   memset(&out->stiffness, 0, sizeof out->stiffness);
   out->n = count;

@@ -40,7 +40,9 @@ static ep_status compose_quality(const ep_map *first, const ep_map *second, ep_m
   out->quality = *from;
   out->quality.region = NULL;
   out->quality.candidate = NULL;
-  out->quality.candidates = out->quality.rivals = 0;
+  out->quality.landmark = NULL;
+  out->quality.candidates = out->quality.rivals = out->quality.against = 0;
+  out->quality.exchanged = out->quality.exchanged_with = -1;
   out->quality.settle_from = out->quality.settle_to = out->quality.settle_other = -1;
   out->quality.determinant = first->quality.determinant * second->quality.determinant;
   out->quality.frame_angle = ep_frame_angle(out->rotation);

@@ -36,6 +36,7 @@ void ep_map_free(ep_map *map) {
   free(map->c);
   free(map->a);
   free(map->quality.region);
+  free(map->quality.landmark);
   free(map->quality.candidate);
   memset(map, 0, sizeof *map);
 }
@@ -59,6 +60,7 @@ typedef struct job {
   unsigned char *use; // (regions) that take part, NULL without regions
   ep_log *log;
   ep_candidates candidates;
+  ep_landmark_quality held[EP_LANDMARKS_MAX]; // landmarks held out, in the chosen frame
 } job;
 
 static ep_match_rule rule_of(const job *j) {
@@ -105,6 +107,8 @@ static ep_status choose_frame(job *j, const ep_match_rule *rule, ep_error *err) 
   ep_status status = coarsen(&j->from, SCOUTS, &from, err);
   if (status == EP_OK) status = coarsen(&j->to, SCOUTS, &to, err);
   if (status == EP_OK) status = ep_candidates_try(&from.side, &to.side, rule, j->options, c, err);
+  if (status == EP_OK && from.side.marks)
+    status = ep_held_marks(&from.side, &to.side, rule, c->frame[c->chosen].rotation, j->held, err);
   if (status == EP_OK && c->rivals) {
     c->settle_from = from.sample[c->settle_from];
     c->settle_to = to.sample[c->settle_to];
@@ -236,10 +240,17 @@ static ep_status record_candidates(const job *j, ep_map_quality *q, ep_error *er
   memcpy(q->candidate, c->frame, (size_t)c->count * sizeof *q->candidate);
   q->candidates = c->count;
   q->rivals = c->rivals;
+  q->against = c->against;
+  q->exchanged = c->exchanged[0];
+  q->exchanged_with = c->exchanged[1];
   q->settle_from = c->settle_from;
   q->settle_to = c->settle_to;
   q->settle_other = c->settle_other;
   q->landmarks = j->options->landmarks;
+  if (!q->landmarks) return EP_OK;
+  q->landmark = malloc((size_t)q->landmarks * sizeof *q->landmark);
+  if (!q->landmark) return ep_fail(err, EP_ERR_MEMORY, "no memory for a record");
+  memcpy(q->landmark, j->held, (size_t)q->landmarks * sizeof *q->landmark);
   return EP_OK;
 }
 

@@ -42,10 +42,11 @@ typedef struct ep_side {
   double *region;    // (n x regions) smoothed
   double *skin;      // (n) 1 on the boundary, 0 inside
   int marks;
-  bool splines;   // which functions the landmarks have
-  double *mark;   // (n x marks) smooth bump around each landmark, mean square 1; or its spline
-  double *mark_x; // (marks x 3) landmarks, like x
-  int *mark_near; // (marks) vertex nearest to each
+  bool splines;      // which functions the landmarks have
+  double *mark;      // (n x marks) smooth bump around each landmark, mean square 1; or its spline
+  double *mark_x;    // (marks x 3) landmarks, like x
+  int *mark_near;    // (marks) vertex nearest to each
+  double *mark_gram; // (marks x marks) kernel of the splines between landmarks; NULL without
 } ep_side;
 
 ep_status ep_side_make(const ep_shape *shape, int k, ep_side *out, ep_error *err);
@@ -135,9 +136,10 @@ ep_status ep_trial_run(const ep_side *from, const ep_side *to, const ep_match_ru
 double ep_frame_between(const double a[9], const double b[9]); // degrees; 180 where one is mirrored
 
 // ---- candidates.c: frames tried on coarse sides.
-enum { EP_CANDIDATES_MAX = 40 };
+enum { EP_CANDIDATES_MAX = 64 };
 typedef struct ep_candidates {
-  int count, chosen, preferred, rivals;
+  int count, chosen, preferred, rivals, against;
+  int exchanged[2]; // landmarks, else regions, that seem to have each other's partner; or -1
   int settle_from, settle_to, settle_other; // samples, -1 where the choice is clear
   ep_frame_candidate frame[EP_CANDIDATES_MAX];
   int *p[EP_CANDIDATES_MAX]; // (from->n) the map found in each frame
@@ -145,6 +147,36 @@ typedef struct ep_candidates {
 ep_status ep_candidates_try(const ep_side *from, const ep_side *to, const ep_match_rule *rule,
                             const ep_map_options *o, ep_candidates *c, ep_error *err);
 void ep_candidates_free(ep_candidates *c);
+// A frame to try; one too many is left out.
+void ep_candidates_add(ep_candidates *c, const double r[9], const char *name);
+// Principal axes matched in all proper (or all mirrored) ways.
+ep_status ep_candidates_add_axes(ep_candidates *c, const ep_side *from, const ep_side *to,
+                                 bool mirrored, ep_error *err);
+// Try frame `which`: its figures and its map p.
+ep_status ep_candidates_run(const ep_side *from, const ep_side *to, const ep_match_rule *rule,
+                            int rounds, ep_candidates *c, int which, ep_error *err);
+void ep_candidates_drop(ep_candidates *c, int which);
+// Rms distance of the images of two maps over to's rms radius.
+double ep_candidates_difference(const ep_side *from, const ep_side *to, const int *p, const int *q);
+// A score is clearly better by this factor: right frames of shapes without symmetry were 1.5 to
+// 2.5 times better than any flip, those of near-symmetric shapes 0.8 to 1.2 (own measurement,
+// bench_maps and data/). Maps that differ by less are one: a flip moves points by the radius.
+#define EP_FRAME_CLEARLY 1.4
+#define EP_FRAME_SAME    0.35
+
+// ---- opinion.c: what the shapes alone say of a frame somebody gave.
+// Frames are tried without landmarks and regions where a family, the user or they chose: all flips
+// of the axes, the authored frame, the chosen one. Those that contradict the choice are marked and
+// counted. Between shapes of one family nobody chose: a far better frame is taken.
+ep_status ep_candidates_second_opinion(const ep_side *from, const ep_side *to,
+                                       const ep_match_rule *rule, const ep_map_options *o,
+                                       ep_candidates *c, ep_error *err);
+
+// ---- held_marks.c
+// Each landmark mapped by the others alone, in frame r: out (from->marks). Fewer than five: all -1,
+// splines of fewer than four say nothing about the rest. Sides may be coarse.
+ep_status ep_held_marks(const ep_side *from, const ep_side *to, const ep_match_rule *rule,
+                        const double r[9], ep_landmark_quality *out, ep_error *err);
 
 // ---- couple.c: the objective and its Euclidean gradient (tests compare with differences).
 typedef struct ep_couple_problem {
@@ -186,6 +218,7 @@ void ep_region_suspects(int regions, const double *overlap, const unsigned char 
 // same_family: larger turns of the frame are expected.
 ep_status ep_map_judge(const ep_side *from, const ep_side *to, const unsigned char *use,
                        bool same_family, ep_map *map, ep_error *err);
+// ---- verdict.c
 // Verdict and reasons from what the record holds; the meshes for names and numbers of vertices.
 void ep_map_verdict(const ep_mesh *from, const ep_mesh *to, bool same_family, ep_map *map);
 

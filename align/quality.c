@@ -6,16 +6,6 @@
 #include "align/private.h"
 #include "linalg/dense.h"
 
-// Thresholds of the verdict. Round trip: measured over eleven pairs, good maps <= .22, the one
-// failure .60 (DESIGN "Maps"); Jaccard: usable maps had .64 and more, failed ones .37-.43 (same
-// place). Coverage: own choice, a map that leaves a third of the example out misses a limb. Frame:
-// tilts of 40 degrees are always repaired, 60 nearly always, 90 rarely: a larger turn may be wrong.
-// All from few data.
-static const double CYCLE_DOUBTFUL = 0.3, CYCLE_BAD = 0.6;
-static const double JACCARD_DOUBTFUL = 0.5, JACCARD_BAD = 0.3;
-static const double COVERAGE_DOUBTFUL = 0.65, COVERAGE_BAD = 0.3;
-// Poses of one family turn by up to 57 degrees (same place).
-static const double FRAME_DOUBTFUL = 45, FRAME_DOUBTFUL_FAMILY = 60;
 // A region is suspect where another fits by so much better, and its own partner hardly.
 static const double SUSPECT_MARGIN = 0.15, SUSPECT_JACCARD = 0.5, SUSPECT_WEIGHT = 0.1;
 // Neighbouring eigenvalues closer than this (relative) may swap or mix between shapes.
@@ -150,6 +140,40 @@ static ep_status judge_points(const ep_side *from, const ep_side *to, ep_map *ma
   free(image);
   free(kx);
   free(nearest);
+  return status;
+}
+
+// Six times the volume of a tet with these corners, signed.
+static double signed_volume(const double *x, const int *v) {
+  double d[9];
+  for (int k = 0; k < 9; k++)
+    d[k] = x[3 * (size_t)v[1 + k / 3] + k % 3] - x[3 * (size_t)v[0] + k % 3];
+  return ep_frame_determinant(d);
+}
+
+// Share of the volume around whose vertices the images of the tets have, together, the handedness
+// of the tets: a map that exchanges left and right inside a shape, or folds it, loses it there.
+static ep_status judge_handedness(const ep_side *from, const ep_side *to, ep_map *map,
+                                  ep_error *err) {
+  const ep_mesh *mesh = from->shape->mesh;
+  double *image = malloc(3 * (size_t)from->n * sizeof *image);
+  double *star = calloc((size_t)from->n, sizeof *star);
+  ep_status status =
+      image && star ? EP_OK : ep_fail(err, EP_ERR_MEMORY, "no memory to judge a map");
+  if (status == EP_OK) {
+    const double side = ep_frame_determinant(map->rotation) < 0 ? -1 : 1;
+    ep_map_pull(map, to->shape->mesh, 3, to->x, image);
+    for (int e = 0; e < mesh->nt; e++) {
+      const int *v = mesh->tet + 4 * (size_t)e;
+      const double turned = signed_volume(from->x, v) < 0 ? -side : side;
+      for (int c = 0; c < 4; c++) star[v[c]] += turned * signed_volume(image, v);
+    }
+    map->quality.handed = 0;
+    for (int i = 0; i < from->n; i++)
+      if (star[i] > 0) map->quality.handed += from->share[i];
+  }
+  free(image);
+  free(star);
   return status;
 }
 
@@ -320,94 +344,8 @@ ep_status ep_map_judge(const ep_side *from, const ep_side *to, const unsigned ch
                        bool same_family, ep_map *map, ep_error *err) {
   EP_TRY(judge_basis(from, map, err));
   EP_TRY(judge_points(from, to, map, err));
+  EP_TRY(judge_handedness(from, to, map, err));
   if (use) EP_TRY(judge_regions(from, to, use, map, err));
   ep_map_verdict(from->shape->mesh, to->shape->mesh, same_family, map);
   return EP_OK;
-}
-
-// One measure against its two thresholds; high: large values are bad.
-static void weigh(ep_map_quality *q, const char *what, double value, double doubtful, double bad,
-                  bool high, const char *advice) {
-  const bool is_bad = high ? value > bad : value < bad;
-  const bool is_doubtful = high ? value > doubtful : value < doubtful;
-  if (!is_bad && !is_doubtful) return;
-  const ep_verdict verdict = is_bad ? EP_MAP_BAD : EP_MAP_DOUBTFUL;
-  if (verdict > q->verdict) q->verdict = verdict;
-  const size_t used = strlen(q->reasons);
-  snprintf(q->reasons + used, sizeof q->reasons - used, "%s%s %.2f (%s %.2f wanted); %s",
-           used ? "; " : "", what, value, high ? "at most" : "at least", doubtful, advice);
-}
-
-static const char *file_name(const ep_mesh *mesh) {
-  const char *slash = strrchr(mesh->name, '/');
-  return slash ? slash + 1 : mesh->name;
-}
-
-// More than one frame fits: name them, and the landmark that tells them apart.
-static void weigh_rivals(const ep_mesh *from, const ep_mesh *to, ep_map_quality *q) {
-  if (!q->rivals) return;
-  if (q->verdict == EP_MAP_GOOD) q->verdict = EP_MAP_DOUBTFUL;
-  char *end = q->reasons + sizeof q->reasons, *at = q->reasons + strlen(q->reasons);
-  const char *chosen = "";
-  for (int i = 0; i < q->candidates; i++)
-    if (q->candidate[i].chosen) chosen = q->candidate[i].name;
-  at += snprintf(at, (size_t)(end - at), "%sframe '%s' was chosen, but",
-                 at > q->reasons ? "; " : "", chosen);
-  int named = 0;
-  for (int i = 0; i < q->candidates && at < end - 64; i++)
-    if (q->candidate[i].rival && named++ < 3)
-      at += snprintf(at, (size_t)(end - at), "%s '%s'", named > 1 ? "," : "", q->candidate[i].name);
-  if (at < end && q->rivals > 3)
-    at += snprintf(at, (size_t)(end - at), " and %d more", q->rivals - 3);
-  if (at < end)
-    snprintf(at, (size_t)(end - at),
-             " fit%s as well: nothing tells them apart. One landmark settles it: vertex %d of %s "
-             "with vertex %d of %s, as mapped now, or with %d (numbers of the files, from 1); or "
-             "say that the authored frame is right",
-             q->rivals > 1 ? "" : "s", from->file_vertex[q->settle_from] + 1, file_name(from),
-             to->file_vertex[q->settle_to] + 1, file_name(to),
-             to->file_vertex[q->settle_other] + 1);
-}
-
-static void weigh_inverted(ep_map_quality *q) {
-  if (q->inverted_left <= 0) return;
-  const size_t used = strlen(q->reasons);
-  if (q->verdict == EP_MAP_GOOD) q->verdict = EP_MAP_DOUBTFUL;
-  snprintf(q->reasons + used, sizeof q->reasons - used,
-           "%s%d tet(s) of the transferred pose are inverted; use fewer eigenfunctions or a finer "
-           "object",
-           used ? "; " : "", q->inverted_left);
-}
-
-void ep_map_note_inverted(ep_map *map, int inverted, int left) {
-  map->quality.inverted = inverted;
-  map->quality.inverted_left = left;
-  weigh_inverted(&map->quality);
-}
-
-void ep_map_verdict(const ep_mesh *from, const ep_mesh *to, bool same_family, ep_map *map) {
-  ep_map_quality *q = &map->quality;
-  q->verdict = EP_MAP_GOOD;
-  q->reasons[0] = '\0';
-  const char *give = q->regions ? "check the regions, give more" : "give regions";
-  if (q->cycle >= 0) weigh(q, "round trip", q->cycle, CYCLE_DOUBTFUL, CYCLE_BAD, true, give);
-  weigh(q, "covered share", q->coverage, COVERAGE_DOUBTFUL, COVERAGE_BAD, false, give);
-  if (!q->regions && !q->landmarks && same_family)
-    weigh(q, "turn of the frame in degrees", q->frame_angle,
-          same_family ? FRAME_DOUBTFUL_FAMILY : FRAME_DOUBTFUL, HUGE_VAL, true,
-          "turn the example as the object stands, or give regions");
-  weigh_rivals(from, to, q);
-  double jaccard = 0;
-  int used = 0;
-  for (int g = 0; g < q->regions; g++) {
-    if (q->region[g].suspect) continue;
-    jaccard += q->region[g].jaccard;
-    used++;
-  }
-  if (q->regions && 2 * used <= q->regions)
-    weigh(q, "share of regions that agree", (double)used / q->regions, 0.5 + 1e-9, 0, false,
-          "half of the regions contradict the map: check their order");
-  if (used)
-    weigh(q, "mean Jaccard of regions", jaccard / used, JACCARD_DOUBTFUL, JACCARD_BAD, false,
-          "check the regions' order and the example's pose");
 }

@@ -20,6 +20,7 @@ void ep_side_free(ep_side *side) {
   free(side->mark);
   free(side->mark_x);
   free(side->mark_near);
+  free(side->mark_gram);
   ep_csr_free(&side->stiffness);
   memset(side, 0, sizeof *side);
 }

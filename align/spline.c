@@ -49,8 +49,13 @@ ep_status ep_side_splines(ep_side *side, ep_error *err) {
       for (size_t k = 0; k < marks; k++) inverse[m * marks + k] = m == k;
       gram[m * marks + m] += SOFT;
     }
-    status = ep_solve_spd(side->marks, gram, side->marks, inverse, err);
+    side->mark_gram = malloc(marks * marks * sizeof *gram);
+    if (side->mark_gram)
+      memcpy(side->mark_gram, gram, marks * marks * sizeof *gram);
+    else
+      status = ep_fail(err, EP_ERR_MEMORY, "no memory for %d landmarks", side->marks);
   }
+  if (status == EP_OK) status = ep_solve_spd(side->marks, gram, side->marks, inverse, err);
   if (status == EP_OK) ep_gemm(side->n, side->marks, side->marks, kernel, inverse, side->mark);
   free(kernel);
   free(gram);

@@ -162,13 +162,43 @@ static void fit(const ep_view *view, int first, int last, const ep_panel *panel,
 
 // ---- layout ----------------------------------------------------------------------------------
 typedef struct layout {
-  int columns, rows, title, label; // heights of the title band and of each label band
+  int columns, rows;
+  int title, label; // heights of the band of title and note, and of each label band
 } layout;
+
+// A line of `text` that fits into `room` pixels, broken at a blank: its length. *next: what
+// follows.
+static size_t line_of(const char *text, double size, double room, const char **next) {
+  char line[240];
+  size_t best = 0;
+  for (size_t i = 1; i < sizeof line && text[i - 1]; i++) {
+    if (text[i] && text[i] != ' ') continue;
+    memcpy(line, text, i);
+    line[i] = 0;
+    if (best && ep_text_width(size, line) > room) break;
+    best = i;
+  }
+  if (!best) best = strnlen(text, sizeof line - 1); // one word longer than a line
+  *next = text + best;
+  while (**next == ' ') ++*next;
+  return best;
+}
+
+static double note_size(const ep_view *view) {
+  return 0.8 * view->label_size;
+}
+
+static int lines_of_note(const ep_view *view, double room) {
+  int lines = 0;
+  for (const char *at = view->note; at && *at; lines++) line_of(at, note_size(view), room, &at);
+  return lines;
+}
 
 static layout lay_out(const ep_view *view, int panels, const ep_panel *panel) {
   layout l = {.columns = view->columns > 0 && view->columns < panels ? view->columns : panels};
   l.rows = (panels + l.columns - 1) / l.columns;
   l.title = view->title ? (int)ceil(3.2 * view->label_size) : 0;
+  l.title += (int)ceil(1.8 * note_size(view) * lines_of_note(view, l.columns * view->width - 32.0));
   for (int p = 0; p < panels; p++)
     if (panel[p].label) l.label = (int)ceil(2.4 * view->label_size);
   return l;
@@ -252,6 +282,19 @@ static ep_status draw_label(const ep_view *view, ep_image *image, double middle,
                        err);
 }
 
+static ep_status draw_note(const ep_view *view, ep_image *image, ep_error *err) {
+  const double size = note_size(view), room = image->width - 32.0;
+  double baseline = (view->title ? 3.2 : 1.2) * view->label_size + 0.8 * size;
+  for (const char *at = view->note, *next; at && *at; at = next, baseline += 1.8 * size) {
+    char line[240];
+    const size_t length = line_of(at, size, room, &next);
+    memcpy(line, at, length);
+    line[length] = 0;
+    EP_TRY(draw_label(view, image, image->width / 2.0, baseline, room, line, size, err));
+  }
+  return EP_OK;
+}
+
 static ep_status draw_panels(const ep_view *view, const layout *l, int panels,
                              const ep_panel *panel, ep_frame *frame, ep_image *image,
                              ep_error *err) {
@@ -292,6 +335,7 @@ ep_status ep_picture_render(const ep_view *view, int panels, const ep_panel *pan
   if (status == EP_OK && view->title)
     status = draw_label(view, out, out->width / 2.0, 2.2 * view->label_size, out->width - 16.0,
                         view->title, 1.3 * view->label_size, err);
+  if (status == EP_OK) status = draw_note(view, out, err);
   if (status != EP_OK) ep_image_free(out);
   return status;
 }

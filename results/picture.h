@@ -41,6 +41,7 @@ typedef struct ep_view {
   double label_size;       // height of capitals [pixels]
   float top[3], bottom[3]; // background colours, sRGB
   const char *title;       // above everything; NULL: none
+  const char *note;        // small text below the title, broken into lines; NULL: none
 } ep_view;
 ep_view ep_default_view(void);
 

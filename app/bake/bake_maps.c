@@ -120,6 +120,8 @@ static ep_status compute_map(ep_bake *bake, ep_bake_step *step, ep_map *map, ep_
                        &bake->mass[stage->to]};
   ep_status status = ep_bake_compute(bake, step, err);
   if (status == EP_OK) status = ep_map_match(&from, &to, &options, bake->log, map, err);
+  if (status == EP_ERR_ARGUMENT && options.landmarks) // what else is given is checked by now
+    status = ep_fail_context(err, "families.%d.map.landmarks", stage->family);
   if (status == EP_OK) status = ep_map_store(bake->cache, stage->name, &stage->key, map, err);
   ep_regions_free(&regions);
   return status;

@@ -13,6 +13,7 @@
   X(determinant)                                                                                   \
   X(coverage)                                                                                      \
   X(cycle)                                                                                         \
+  X(handed)                                                                                        \
   X(dirichlet)                                                                                     \
   X(near_multiple)                                                                                 \
   X(reframe_rounds)                                                                                \
@@ -26,6 +27,9 @@
   X(landmark_residual)                                                                             \
   X(candidates)                                                                                    \
   X(rivals)                                                                                        \
+  X(against)                                                                                       \
+  X(exchanged)                                                                                     \
+  X(exchanged_with)                                                                                \
   X(settle_from)                                                                                   \
   X(settle_to)                                                                                     \
   X(settle_other)                                                                                  \
@@ -34,7 +38,8 @@
 #define REGION_FIELDS(X) X(residual_before) X(residual_after) X(jaccard) X(best_match) X(suspect)
 #define CANDIDATE_FIELDS(X)                                                                        \
   X(reflected)                                                                                     \
-  X(start_angle) X(score) X(distance) X(cycle) X(landmark) X(chosen) X(rival)
+  X(start_angle) X(score) X(distance) X(cycle) X(landmark) X(chosen) X(rival) X(alone) X(against)
+#define LANDMARK_FIELDS(X) X(held_out) X(best_match)
 
 #define COUNT(field) +1
 #define PACK(field)  numbers[i++] = (double)record->field;
@@ -42,6 +47,7 @@ enum {
   QUALITY_NUMBERS = 0 QUALITY_FIELDS(COUNT),
   REGION_NUMBERS = 0 REGION_FIELDS(COUNT),
   CANDIDATE_NUMBERS = 9 CANDIDATE_FIELDS(COUNT), // the rotation first
+  LANDMARK_NUMBERS = 0 LANDMARK_FIELDS(COUNT),
   FRAME_NUMBERS = 7,
   NAME = sizeof((ep_frame_candidate *)0)->name,
   REASONS = sizeof((ep_map_quality *)0)->reasons,
@@ -65,6 +71,14 @@ static void unpack_region(const double *numbers, ep_region_quality *record) {
   int i = 0;
   REGION_FIELDS(UNPACK)
 }
+static void pack_landmark(const ep_landmark_quality *record, double *numbers) {
+  int i = 0;
+  LANDMARK_FIELDS(PACK)
+}
+static void unpack_landmark(const double *numbers, ep_landmark_quality *record) {
+  int i = 0;
+  LANDMARK_FIELDS(UNPACK)
+}
 static void pack_candidate(const ep_frame_candidate *record, double *numbers) {
   int i = 9;
   memcpy(numbers, record->rotation, sizeof record->rotation);
@@ -82,7 +96,7 @@ static void unpack_candidate(const double *numbers, ep_frame_candidate *record) 
 typedef struct packed {
   double quality[QUALITY_NUMBERS], frame[FRAME_NUMBERS];
   char reasons[REASONS];
-  double *regions, *candidates;
+  double *regions, *candidates, *landmarks;
   char *names;
 } packed;
 
@@ -91,7 +105,8 @@ static ep_status pack(const ep_map *map, packed *p, ep_error *err) {
   p->regions = calloc((size_t)q->regions * REGION_NUMBERS + 1, sizeof *p->regions);
   p->candidates = calloc((size_t)q->candidates * CANDIDATE_NUMBERS + 1, sizeof *p->candidates);
   p->names = calloc((size_t)q->candidates + 1, NAME);
-  if (!p->regions || !p->candidates || !p->names)
+  p->landmarks = calloc((size_t)q->landmarks * LANDMARK_NUMBERS + 1, sizeof *p->landmarks);
+  if (!p->regions || !p->candidates || !p->names || !p->landmarks)
     return ep_fail(err, EP_ERR_MEMORY, "no memory to store a map");
   pack_quality(q, p->quality);
   for (int i = 0; i < q->regions; i++) pack_region(&q->region[i], p->regions + REGION_NUMBERS * i);
@@ -99,6 +114,8 @@ static ep_status pack(const ep_map *map, packed *p, ep_error *err) {
     pack_candidate(&q->candidate[i], p->candidates + CANDIDATE_NUMBERS * i);
     snprintf(p->names + NAME * i, NAME, "%s", q->candidate[i].name);
   }
+  for (int i = 0; q->landmark && i < q->landmarks; i++)
+    pack_landmark(&q->landmark[i], p->landmarks + LANDMARK_NUMBERS * i);
   snprintf(p->reasons, sizeof p->reasons, "%s", q->reasons);
   p->frame[0] = map->scale;
   memcpy(p->frame + 1, map->center_from, sizeof map->center_from);
@@ -109,7 +126,7 @@ static ep_status pack(const ep_map *map, packed *p, ep_error *err) {
 static ep_status store(const ep_cache *cache, const char *stage, const ep_digest *key,
                        const ep_map *map, const packed *p, ep_error *err) {
   const ep_map_quality *q = &map->quality;
-  ep_tensor tensors[12] = {
+  ep_tensor tensors[13] = {
       ep_tensor_of("p", EP_I32, map->p, map->n, 0, 0),
       ep_tensor_of("tet", EP_I32, map->tet, map->n, 0, 0),
       ep_tensor_of("weight", EP_F64, map->weight, map->n, 4, 0),
@@ -123,6 +140,9 @@ static ep_status store(const ep_cache *cache, const char *stage, const ep_digest
   int count = 9;
   if (q->regions)
     tensors[count++] = ep_tensor_of("regions", EP_F64, p->regions, q->regions, REGION_NUMBERS, 0);
+  if (q->landmark)
+    tensors[count++] =
+        ep_tensor_of("landmarks", EP_F64, p->landmarks, q->landmarks, LANDMARK_NUMBERS, 0);
   if (q->candidates) {
     tensors[count++] =
         ep_tensor_of("candidates", EP_F64, p->candidates, q->candidates, CANDIDATE_NUMBERS, 0);
@@ -139,6 +159,7 @@ ep_status ep_map_store(const ep_cache *cache, const char *stage, const ep_digest
   free(p.regions);
   free(p.candidates);
   free(p.names);
+  free(p.landmarks);
   return status;
 }
 
@@ -174,6 +195,20 @@ static bool take_candidates(const ep_artifact *artifact, ep_map_quality *q) {
   return q->candidate != NULL;
 }
 
+static bool take_landmarks(const ep_artifact *artifact, ep_map_quality *q) {
+  const size_t count = (size_t)q->landmarks;
+  if (!count) return true;
+  const double *numbers =
+      ep_artifact_array(artifact, "landmarks", EP_F64, count * LANDMARK_NUMBERS);
+  q->landmark = numbers ? calloc(count, sizeof *q->landmark) : NULL;
+  bool good = q->landmark != NULL;
+  for (size_t i = 0; good && i < count; i++) {
+    unpack_landmark(numbers + LANDMARK_NUMBERS * i, &q->landmark[i]);
+    good = q->landmark[i].best_match >= 0 && q->landmark[i].best_match < q->landmarks;
+  }
+  return good;
+}
+
 static bool take_quality(const ep_artifact *artifact, ep_map_quality *q) {
   const double *numbers = ep_artifact_array(artifact, "quality", EP_F64, QUALITY_NUMBERS);
   const char *reasons = ep_artifact_array(artifact, "reasons", EP_U8, REASONS);
@@ -181,10 +216,14 @@ static bool take_quality(const ep_artifact *artifact, ep_map_quality *q) {
   unpack_quality(numbers, q);
   memcpy(q->reasons, reasons, REASONS - 1);
   const bool sane = q->regions >= 0 && q->regions < RECORDS_MAX && q->candidates >= 0 &&
-                    q->candidates < RECORDS_MAX;
-  if (sane && take_regions(artifact, q) && take_candidates(artifact, q)) return true;
+                    q->candidates < RECORDS_MAX && q->landmarks >= 0 &&
+                    q->landmarks <= EP_LANDMARKS_MAX;
+  if (sane && take_regions(artifact, q) && take_candidates(artifact, q) &&
+      take_landmarks(artifact, q))
+    return true;
   if (!q->region) q->regions = 0;
   if (!q->candidate) q->candidates = 0;
+  if (!q->landmark) q->landmarks = 0;
   return false;
 }
 

@@ -100,10 +100,11 @@ static ep_status fill_view(map_view *v, ep_error *err) {
 }
 
 static ep_status draw_colors(const map_view *v, const char *path, ep_error *err) {
-  char label[2][100], title[160];
+  char label[2][100], title[240];
+  const char *reasons = v->map->quality.reasons;
   snprintf(label[0], sizeof label[0], "%s, coloured by its images", v->from_name);
   snprintf(label[1], sizeof label[1], "%s, coloured by position", v->to_name);
-  snprintf(title, sizeof title, "same colour where mapped; the map is %s",
+  snprintf(title, sizeof title, "%.70s -> %.70s: the map is %s", v->from_name, v->to_name,
            ep_verdict_name(v->map->quality.verdict));
   const ep_gallery_item item[2] = {{v->from, NULL, v->color_from, label[0]},
                                    {v->to, v->there, v->color_to, label[1]}};
@@ -112,6 +113,7 @@ static ep_status draw_colors(const map_view *v, const char *path, ep_error *err)
   view.width = 560;
   view.height = 460;
   view.title = title;
+  view.note = *reasons ? reasons : "same colour where mapped";
   return ep_gallery_poses(path, &view, 2, item, 0, err);
 }
 
@@ -139,6 +141,8 @@ static ep_status draw_functions(const map_view *v, const char *path, ep_error *e
   view.height = 320;
   view.columns = v->functions;
   view.title = "eigenfunctions above, the coupled ones of the other shape below";
+  view.note = "red above zero, blue below, one scale for each column; where the map is right both "
+              "rows agree";
   const ep_status status = ep_gallery_poses(path, &view, 2 * v->functions, item, 0, err);
   free(color);
   return status;
@@ -342,20 +346,38 @@ static ep_status color_pose_view(pose_view *v, ep_error *err) {
   return EP_OK;
 }
 
-static ep_status draw_pose(const pose_view *v, const char *name, const ep_pose_quality *q,
-                           const char *path, ep_error *err) {
-  char title[240];
-  snprintf(title, sizeof title, "%.100s on the object's mesh: %.0f inverted tets", name,
-           q->inverted_tets);
+// What the pose is worth: its tets, and the maps it came through where they are not good.
+static void pose_note(const pose_view *v, const ep_pose_quality *q, size_t size, char *note) {
+  const ep_map *map[2] = {v->to_rest, v->to_pose};
+  static const char *const to[2] = {"to the example at rest", "from there to its pose"};
+  int used = snprintf(note, size, "same colour where mapped; %.0f inverted tets", q->inverted_tets);
+  if (q->inverted_before > 0)
+    used += snprintf(note + used, size - (size_t)used, " (%.0f before repair)", q->inverted_before);
+  used += snprintf(note + used, size - (size_t)used, ", smallest volume %.2g of rest",
+                   q->worst_volume_ratio);
+  for (int i = 0; i < 2; i++)
+    if (map[i] && map[i]->quality.verdict != EP_MAP_GOOD)
+      used += snprintf(note + used, size - (size_t)used, "; the map %s is %s", to[i],
+                       ep_verdict_name(map[i]->quality.verdict));
+}
+
+static ep_status draw_pose(const pose_view *v, const char *name, const char *rest,
+                           const ep_pose_quality *q, const char *path, ep_error *err) {
+  char title[140], note[320], label[2][120];
+  snprintf(title, sizeof title, "%.100s on the object's mesh", name);
+  snprintf(label[0], sizeof label[0], "example at rest: %.80s", rest);
+  snprintf(label[1], sizeof label[1], "example in its pose: %.80s", name);
+  pose_note(v, q, sizeof note, note);
   const ep_gallery_item item[4] = {
-      {v->rest, v->rest_x, v->rest_color, "example at rest"},
-      {v->pose, v->pose_x, v->pose_color, "example in its pose"},
+      {v->rest, v->rest_x, v->rest_color, label[0]},
+      {v->pose, v->pose_x, v->pose_color, label[1]},
       {v->object, NULL, v->object_color, "object at rest"},
       {v->object, v->object_x, v->object_color, "object in that pose"}};
   ep_view view = ep_default_view();
   view.shared = false;
   view.columns = 2;
   view.title = title;
+  view.note = note;
   return ep_gallery_poses(path, &view, 4, item, 0, err);
 }
 
@@ -403,7 +425,8 @@ ep_status ep_align_view_pose(const char *folder, ep_bake *bake, int example, ep_
   snprintf(file, sizeof file, "pose-%s", name);
   ep_status status = fill_pose_view(bake, source, u, &v, err);
   if (status == EP_OK) status = file_path(folder, file, ".png", path, err);
-  if (status == EP_OK) status = draw_pose(&v, name, &bake->quality[example], path, err);
+  if (status == EP_OK)
+    status = draw_pose(&v, name, shape[source->rest].name, &bake->quality[example], path, err);
   if (status == EP_OK) status = file_path(folder, file, ".vtu", path, err);
   if (status == EP_OK) status = write_pose(&v, u, path, err);
   free_pose_view(&v);

@@ -18,6 +18,19 @@ static json_t *region_json(int index, const ep_region_quality *r) {
   return object;
 }
 
+// The landmarks as the others see them; null where not tried.
+static json_t *landmarks_json(const ep_map_quality *q) {
+  json_t *list = json_array();
+  for (int m = 0; list && q->landmark && m < q->landmarks; m++) {
+    const ep_landmark_quality *l = &q->landmark[m];
+    json_array_append_new(
+        list, json_pack("{s:i, s:o, s:i, s:b}", "landmark", m + 1, "held_out",
+                        l->held_out < 0 ? json_null() : ep_json_number(l->held_out), "best_match",
+                        l->best_match + 1, "suspect", l->best_match != m));
+  }
+  return list;
+}
+
 // One frame that was tried.
 static json_t *frame_json(const ep_frame_candidate *c) {
   json_t *object = json_object();
@@ -32,6 +45,8 @@ static json_t *frame_json(const ep_frame_candidate *c) {
                       c->landmark < 0 ? json_null() : ep_json_number(c->landmark));
   json_object_set_new(object, "chosen", json_boolean(c->chosen));
   json_object_set_new(object, "rival", json_boolean(c->rival));
+  json_object_set_new(object, "alone", json_boolean(c->alone));
+  json_object_set_new(object, "against", json_boolean(c->against));
   json_object_set_new(object, "rotation", ep_json_numbers(9, c->rotation));
   return object;
 }
@@ -59,6 +74,7 @@ static void set_numbers(json_t *object, const ep_map_quality *q) {
       {"determinant", q->determinant},
       {"coverage", q->coverage},
       {"cycle", q->cycle},
+      {"handed", q->handed},
       {"dirichlet", q->dirichlet},
       {"frame_angle", q->frame_angle},
       {"landmark_residual", q->landmark_residual},
@@ -67,9 +83,13 @@ static void set_numbers(json_t *object, const ep_map_quality *q) {
     const char *key;
     int value;
   } counts[] = {
-      {"near_multiple", q->near_multiple}, {"reframe_rounds", q->reframe_rounds},
-      {"landmarks", q->landmarks},         {"rivals", q->rivals},
-      {"inverted_tets", q->inverted_left}, {"inverted_before_repair", q->inverted},
+      {"near_multiple", q->near_multiple},
+      {"reframe_rounds", q->reframe_rounds},
+      {"landmarks", q->landmarks},
+      {"rivals", q->rivals},
+      {"against", q->against},
+      {"inverted_tets", q->inverted_left},
+      {"inverted_before_repair", q->inverted},
   };
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
     json_object_set_new(object, numbers[i].key, ep_json_number(numbers[i].value));
@@ -95,6 +115,11 @@ json_t *ep_quality_json(const ep_map_quality *q, const ep_mesh *from, const ep_m
     json_array_append_new(frames, frame_json(&q->candidate[i]));
   json_object_set_new(object, "regions", regions);
   json_object_set_new(object, "frames", frames);
+  json_object_set_new(object, "landmarks_held_out", landmarks_json(q));
+  json_object_set_new(object, "exchanged",
+                      q->exchanged < 0
+                          ? json_null()
+                          : json_pack("[i, i]", q->exchanged + 1, q->exchanged_with + 1));
   json_object_set_new(object, "settle", settle_json(q, from, to));
   json_object_set_new(object, "coupling",
                       q->coupling_k > 0
@@ -112,9 +137,11 @@ static void frames_text(FILE *out, const ep_map_quality *q, const ep_mesh *from,
   for (int i = 0; i < q->candidates; i++) {
     const ep_frame_candidate *c = &q->candidate[i];
     fprintf(out, "  %-32s %7.3f %9.3f %8.3f%s\n", c->name, c->score, c->distance, c->cycle,
-            c->chosen  ? "  chosen"
-            : c->rival ? "  could be as well"
-                       : "");
+            c->chosen    ? "  chosen"
+            : c->against ? "  contradicts the choice"
+            : c->rival   ? "  could be as well"
+            : c->alone   ? "  by the shapes alone"
+                         : "");
   }
   if (q->settle_from >= 0 && q->settle_to >= 0 && q->settle_other >= 0)
     fprintf(
@@ -123,6 +150,15 @@ static void frames_text(FILE *out, const ep_map_quality *q, const ep_mesh *from,
         "a scene, from 1)\n",
         file_number(from, q->settle_from), file_number(to, q->settle_to),
         file_number(to, q->settle_other));
+}
+
+static void landmarks_text(FILE *out, const ep_map_quality *q) {
+  if (!q->landmarks) return;
+  fprintf(out, "  %d landmarks, residual %.3f", q->landmarks, q->landmark_residual);
+  for (int m = 0; q->landmark && m < q->landmarks && q->landmark[m].held_out >= 0; m++)
+    fprintf(out, "%s%.2f%s", m ? ", " : "; each by the others: ", q->landmark[m].held_out,
+            q->landmark[m].best_match != m ? " (misplaced)" : "");
+  fprintf(out, "\n");
 }
 
 static void regions_text(FILE *out, const ep_map_quality *q) {
@@ -141,10 +177,12 @@ void ep_quality_text(FILE *out, const char *name, const ep_map_quality *q, const
                      const ep_mesh *to) {
   fprintf(out, "%s: %s%s%s\n", name, ep_verdict_name(q->verdict), q->reasons[0] ? ": " : "",
           q->reasons);
-  fprintf(out, "  coverage %.3f, round trip %.3f, Dirichlet %.3f, frame turned by %.1f degrees\n",
-          q->coverage, q->cycle, q->dirichlet, q->frame_angle);
-  if (q->landmarks)
-    fprintf(out, "  %d landmarks, residual %.3f\n", q->landmarks, q->landmark_residual);
+  fprintf(
+      out,
+      "  coverage %.3f, round trip %.3f, left and right kept %.3f, Dirichlet %.3f, frame turned "
+      "by %.1f degrees\n",
+      q->coverage, q->cycle, q->handed, q->dirichlet, q->frame_angle);
+  landmarks_text(out, q);
   frames_text(out, q, from, to);
   regions_text(out, q);
 }

@@ -50,6 +50,9 @@ static void the_record_is_whole(void **state) {
                                      "reasons",
                                      "coverage",
                                      "cycle",
+                                     "handed",
+                                     "against",
+                                     "landmarks_held_out",
                                      "dirichlet",
                                      "regions",
                                      "frames",
@@ -143,6 +146,9 @@ static void mistakes_are_named(void **state) {
                  "align a-map.yaml --set 'families.0.map.landmarks=[{object: 1, rest: 9999}]'");
   expect_failure(5, "1 to ",
                  "align a-map.yaml --set 'families.0.map.landmarks=[{object: 9999, rest: 1}]'");
+  expect_failure(5, "families.0.map.landmarks: ",
+                 "align a-map.yaml --set 'families.0.map.landmarks=[{object_at: [9, 9, 9], "
+                 "rest_at: [0, 0, 0]}]'");
   expect_failure(5, "eigenfunctions are asked for",
                  "align a-map.yaml --set families.0.map.eigenfunctions=190");
   expect_failure(3, "a-empty.ini", "align a-map.yaml --set families.0.map.regions=a-empty.ini");
