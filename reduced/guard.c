@@ -37,8 +37,8 @@ static double way_to(const double f[9], const double cof[9], double room) {
   return d;
 }
 
-// Way of one guard to its limit; <= 0 where it is there, or F is not finite.
-static double way_of(const ep_state *state, int e) {
+// Way of one guard to its limit; <= 0 where it is there, or F is not finite. *jacobian: J.
+static double way_of(const ep_state *state, int e, double *jacobian) {
   double f[9], cof[9];
   guard_gradient(state, e, f);
   for (int i = 0; i < 3; i++) {
@@ -48,8 +48,8 @@ static double way_of(const ep_state *state, int e) {
       cof[3 * i + j] = f[3 * i1 + j1] * f[3 * i2 + j2] - f[3 * i1 + j2] * f[3 * i2 + j1];
     }
   }
-  const double jacobian = f[0] * cof[0] + f[1] * cof[1] + f[2] * cof[2];
-  const double room = jacobian - state->model->guard_limit[e] - slack;
+  *jacobian = f[0] * cof[0] + f[1] * cof[1] + f[2] * cof[2];
+  const double room = *jacobian - state->model->guard_limit[e] - slack;
   return room > 0 ? way_to(f, cof, room) : 0; // false for NaN
 }
 
@@ -64,8 +64,9 @@ static int to_be_evaluated(ep_state *state, int group, const double *q) {
   for (int a = 0; a < r; a++) sum[a % 4] += fabs(q[a] - at[a]) * growth[a];
   const double gone = (sum[0] + sum[1]) + (sum[2] + sum[3]);
   if (gone < state->guard_reach[group] * (1 - slack)) return 0;
-  double reach = INFINITY;
-  for (int e = first; e < end && reach > 0; e++) reach = fmin(reach, way_of(state, e));
+  double reach = INFINITY, jacobian;
+  for (int e = first; e < end && reach > 0; e++) reach = fmin(reach, way_of(state, e, &jacobian));
+  if (!isfinite(reach)) reach = 0; // overflow: nothing is known
   memcpy(at, q, (size_t)r * sizeof *at);
   state->guard_reach[group] = reach;
   return !(reach > 0);
@@ -79,7 +80,7 @@ static double evaluate(ep_state *state, int group, int want_f, int want_k, int p
   ep_kernel_task task = {.r = m->size.r,
                          .s = (to < m->size.guards ? to : m->size.guards) - from,
                          .blocks = m->size.blocks,
-                         .material = EP_GUARD_WALL,
+                         .material = state->guards_soft ? EP_GUARD_SOFT : EP_GUARD_WALL,
                          .g = m->guard_g + (size_t)from * (size_t)m->size.blocks * 72,
                          .lambda = m->guard_stiffness + from,
                          .mu = m->guard_limit + from,
@@ -109,4 +110,22 @@ double ep_guard_add(ep_state *state, const double *q, double *f, double *h, int 
       for (int b = 0; b < r; b++) h[a * r + b] += state->padded_k[a * width + b];
   }
   return energy;
+}
+
+void ep_guard_begin(ep_state *state) {
+  const ep_model *m = state->model;
+  const int groups = groups_of(m);
+  int touched = 0;
+  int turned_over = 0;
+  if (groups > 0) memcpy(state->padded_q, state->q, (size_t)m->size.r * sizeof *state->q);
+  for (int group = 0; group < groups; group++) {
+    if (!to_be_evaluated(state, group, state->q)) continue;
+    touched = 1;
+    for (int e = EP_LANES * group; e < m->size.guards && e < EP_LANES * (group + 1); e++) {
+      double jacobian;
+      way_of(state, e, &jacobian);
+      turned_over |= jacobian < 0;
+    }
+  }
+  state->guards_soft = turned_over || (state->guards_soft && touched);
 }

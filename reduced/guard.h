@@ -4,9 +4,13 @@
 //
 //   W_g = sum_e w_e k_e b(J_e / limit_e),   b(x) = -(x - 1)^2 log x  below 1, 0 above
 // (the barrier of Li et al. 2020, "Incremental Potential Contact", eq. 6), continued below
-// x = EP_GUARD_FLOOR by its parabola there: C2 everywhere, and an object that starts inverted or
-// collapsed finds its way back. The wall stands whatever relief, alpha and strength say: it is no
-// part of the material's resistance.
+// x = EP_GUARD_FLOOR by its parabola there: C2 everywhere. The wall stands whatever relief, alpha
+// and strength say: it is no part of the material's resistance.
+//
+// A wall also stands in the way back: an object that is put turned over would stay jammed between
+// walls. So a step that begins with a guard turned over (J < 0) has parabolas in their place,
+// s (x - 1)^2 / 2, and so have those after it until every guard is above its limit: there both are
+// zero, so the change back adds no energy; the change to parabolas takes some away.
 //
 // What is far from its limit is not looked at: of every group of 8 guards the state remembers where
 // it was looked at last, q_0, and how far F may go from there before any of the group can reach its
@@ -23,10 +27,17 @@
 // the force of the wall where J is a third of the limit.
 #define EP_GUARD_STIFFNESS 10.0
 
+// s of the parabolas: the strength of the material's own penalty.
+#define EP_GUARD_SOFTNESS 0.1
+
 struct ep_state;
 
-// W_g at q (r); its gradient and Hessian are added to f (r) and h (r x r, both triangles) unless
-// NULL. project != 0: element tangents projected to positive semidefinite. 0 without guards.
+// At the beginning of a step from state->q: walls or parabolas.
+void ep_guard_begin(struct ep_state *state);
+
+// W_g at q (r), with the parabolas where the last step had them; its gradient and Hessian are added
+// to f (r) and h (r x r, both triangles) unless NULL. project != 0: element tangents projected to
+// positive semidefinite. 0 without guards.
 double ep_guard_add(struct ep_state *state, const double *q, double *f, double *h, int project);
 
 #endif

@@ -13,6 +13,7 @@ enum { EP_LANES = 8 };
 #define EP_VOLUME_PENALTY EP_MATERIALS
 // And the wall of the guards (reduced/guard.h); lambda holds its stiffness, mu the limit.
 #define EP_GUARD_WALL (EP_MATERIALS + 1)
+#define EP_GUARD_SOFT (EP_MATERIALS + 2) // the parabola of an object that is turned over
 
 // One energy: scale * sum_j weight_j psi(F_j(q) inverse_j).
 typedef struct ep_kernel_term {

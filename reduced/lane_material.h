@@ -143,10 +143,21 @@ LANE_INLINE lane lane_wall(lane x, lane *slope, lane *curvature) {
   return (first + lane_all(0.5) * *curvature * past) * past - gap * gap * l;
 }
 
-LANE_INLINE lane lane_guard(lane stiffness, lane limit, const lane f[9], lane *p, lane *h) {
+LANE_INLINE lane lane_parabola(lane x, lane *slope, lane *curvature) {
+  const lane one = lane_all(1), zero = lane_all(0), soft = lane_all(EP_GUARD_SOFTNESS);
+  const lane gap = lane_select(x < one, x - one, zero);
+  *curvature = lane_select(x < one, soft, zero);
+  *slope = soft * gap;
+  return lane_all(0.5) * soft * gap * gap;
+}
+
+LANE_INLINE lane lane_guard(int soft, lane stiffness, lane limit, const lane f[9], lane *p,
+                            lane *h) {
   const lane one = lane_all(1), safe = lane_select(limit > lane_all(0), limit, one);
   lane slope, curvature, c[9];
-  const lane psi = stiffness * lane_wall(lane_determinant(f) / safe, &slope, &curvature);
+  const lane x = lane_determinant(f) / safe;
+  const lane psi =
+      stiffness * (soft ? lane_parabola(x, &slope, &curvature) : lane_wall(x, &slope, &curvature));
   if (!p) return psi;
   lane_cofactor(f, c);
   slope *= stiffness / safe;
@@ -218,7 +229,8 @@ LANE_INLINE lane lane_corotational(lane lambda, lane mu, const lane f[9], lane *
 
 LANE_INLINE lane lane_material(ep_material model, lane lambda, lane mu, const lane f[9], lane *p,
                                lane *h) {
-  if (model == EP_GUARD_WALL) return lane_guard(lambda, mu, f, p, h);
+  if (model == EP_GUARD_WALL) return lane_guard(0, lambda, mu, f, p, h);
+  if (model == EP_GUARD_SOFT) return lane_guard(1, lambda, mu, f, p, h);
   if (model == EP_VOLUME_PENALTY) return lane_penalty(lambda, mu, f, p, h);
   if (model == EP_STABLE_NEOHOOKEAN) return lane_neohookean(lambda, mu, f, p, h);
   if (model == EP_COROTATIONAL) return lane_corotational(lambda, mu, f, p, h);

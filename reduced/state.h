@@ -108,6 +108,7 @@ struct ep_state {
   double force_scale;  // sum_j w_j (lambda + 2 mu) |G_j|: generalised force at unit strain
   double strain_scale; // max_j |G_j|_F: strain by a unit q
   ep_contact contact;
+  int guards_soft;  // parabolas in place of walls (reduced/guard.h)
   int has_target;   // a target was found before
   double dt_before; // of the last step; 0: none, or q or v was written since
   ep_frame frame;   // free motion: reduced/frame.h; at the end of the last step

@@ -345,6 +345,7 @@ ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *repor
                       .max_iterations = def->max_iterations};
   ep_status status = find_target(&s, report);
   if (status != EP_OK) return status;
+  ep_guard_begin(state);
   predict(&s);
   if (s.free && s.motion.sound) ep_free_freeze(&s.motion, state->q, NULL);
   if (s.contact) begin_contact(&s);

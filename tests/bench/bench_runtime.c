@@ -143,30 +143,33 @@ typedef struct bench_row {
   int r, s, k, solver, stateful; // stateful: state restored before every run, one run a timing
   int floats;
   const char *algorithm; // of NLopt
+  int guards;            // (reduced/guard.h)
 } bench_row;
 
 static const bench_row rows[] = {
-    {"naive force+stiffness", naive, 30, 60, 0, 0, 0, 0, NULL},
-    {"force+stiffness", force_and_stiffness, 30, 60, 0, 0, 0, 0, NULL},
-    {"naive, float", naive_float, 30, 60, 0, 0, 0, 1, NULL},
-    {"force+stiffness, float", force_and_stiffness, 30, 60, 0, 0, 0, 1, NULL},
-    {"energy+force", energy_and_force, 30, 60, 0, 0, 0, 0, NULL},
-    {"target (3 shapes)", target_terms, 30, 60, 2, 0, 0, 0, NULL},
-    {"naive force+stiffness", naive, 60, 200, 0, 0, 0, 0, NULL},
-    {"force+stiffness", force_and_stiffness, 60, 200, 0, 0, 0, 0, NULL},
-    {"naive, float", naive_float, 60, 200, 0, 0, 0, 1, NULL},
-    {"force+stiffness, float", force_and_stiffness, 60, 200, 0, 0, 0, 1, NULL},
-    {"interpolation, Newton", interpolate, 30, 60, 2, 0, 1, 0, NULL},
-    {"interpolation, NLopt", interpolate, 30, 60, 2, 1, 1, 0, NULL},
-    {"step without examples", step, 30, 60, 0, 0, 1, 0, NULL},
-    {"step, Newton", step, 30, 60, 2, 0, 1, 0, NULL},
-    {"step, Newton, float", step, 30, 60, 2, 0, 1, 1, NULL},
-    {"step, LD_LBFGS", step, 30, 60, 2, 1, 1, 0, "LD_LBFGS"},
-    {"step, LD_SLSQP", step, 30, 60, 2, 1, 1, 0, "LD_SLSQP"},
-    {"step, LD_TNEWTON_P..", step, 30, 60, 2, 1, 1, 0, "LD_TNEWTON_PRECOND_RESTART"},
-    {"step, LD_VAR1", step, 30, 60, 2, 1, 1, 0, "LD_VAR1"},
-    {"step, LD_VAR2", step, 30, 60, 2, 1, 1, 0, "LD_VAR2"},
-    {"step, LD_MMA", step, 30, 60, 2, 1, 1, 0, "LD_MMA"},
+    {"naive force+stiffness", naive, 30, 60, 0, 0, 0, 0, NULL, 0},
+    {"force+stiffness", force_and_stiffness, 30, 60, 0, 0, 0, 0, NULL, 0},
+    {"naive, float", naive_float, 30, 60, 0, 0, 0, 1, NULL, 0},
+    {"force+stiffness, float", force_and_stiffness, 30, 60, 0, 0, 0, 1, NULL, 0},
+    {"energy+force", energy_and_force, 30, 60, 0, 0, 0, 0, NULL, 0},
+    {"target (3 shapes)", target_terms, 30, 60, 2, 0, 0, 0, NULL, 0},
+    {"naive force+stiffness", naive, 60, 200, 0, 0, 0, 0, NULL, 0},
+    {"force+stiffness", force_and_stiffness, 60, 200, 0, 0, 0, 0, NULL, 0},
+    {"naive, float", naive_float, 60, 200, 0, 0, 0, 1, NULL, 0},
+    {"force+stiffness, float", force_and_stiffness, 60, 200, 0, 0, 0, 1, NULL, 0},
+    {"interpolation, Newton", interpolate, 30, 60, 2, 0, 1, 0, NULL, 0},
+    {"interpolation, NLopt", interpolate, 30, 60, 2, 1, 1, 0, NULL, 0},
+    {"step without examples", step, 30, 60, 0, 0, 1, 0, NULL, 0},
+    {"step w/o ex., guards", step, 30, 60, 0, 0, 1, 0, NULL, 256},
+    {"step, Newton", step, 30, 60, 2, 0, 1, 0, NULL, 0},
+    {"step, Newton, guards", step, 30, 60, 2, 0, 1, 0, NULL, 256},
+    {"step, Newton, float", step, 30, 60, 2, 0, 1, 1, NULL, 0},
+    {"step, LD_LBFGS", step, 30, 60, 2, 1, 1, 0, "LD_LBFGS", 0},
+    {"step, LD_SLSQP", step, 30, 60, 2, 1, 1, 0, "LD_SLSQP", 0},
+    {"step, LD_TNEWTON_P..", step, 30, 60, 2, 1, 1, 0, "LD_TNEWTON_PRECOND_RESTART", 0},
+    {"step, LD_VAR1", step, 30, 60, 2, 1, 1, 0, "LD_VAR1", 0},
+    {"step, LD_VAR2", step, 30, 60, 2, 1, 1, 0, "LD_VAR2", 0},
+    {"step, LD_MMA", step, 30, 60, 2, 1, 1, 0, "LD_MMA", 0},
 };
 
 static void use_floats(bench *x) {
@@ -190,6 +193,7 @@ static void set_up(bench *x, const bench_row *row) {
   memset(x, 0, sizeof *x);
   x->b = bar_create(8, 3, 3, row->r, row->s, row->k ? 10 : 0, row->k, EP_STVK_VOLUME);
   if (row->floats) use_floats(x);
+  if (row->guards) bar_add_guards(x->b, row->guards, 0.3);
   x->state = bar_state(x->b, &x->block);
   x->solver = row->solver;
   ep_error err = {0};

@@ -132,6 +132,61 @@ static void derivatives_are_right(void **state) {
   bar_free(b);
 }
 
+// The parabolas of an object that is turned over.
+static void parabolas_are_right(void **state) {
+  (void)state;
+  bar *b = make(0.6);
+  void *block;
+  ep_state *s = bar_state(b, &block);
+  int tried = 0, right = 0;
+  s->guards_soft = 1;
+  for (int i = 0; i < 40; i++) {
+    double q[R], d[R], expected = 0;
+    bar_random_q(b, 0.1 * i, q);
+    bar_random_q(b, 1, d);
+    for (int g = 0; g < GUARDS; g++) {
+      const double gap = fmin(0, jacobian(b, g, q) / b->model.guard_limit[g] - 1);
+      expected +=
+          b->model.guard_w[g] * b->model.guard_stiffness[g] * 0.5 * EP_GUARD_SOFTNESS * gap * gap;
+    }
+    assert_true(fabs(energy_of(s, q, NULL, NULL, 0) - expected) <= 1e-12 * expected);
+    if (expected == 0) continue;
+    // of some, h^2 is lost in round-off, or a guard crosses its limit between the points
+    const double order = log2(error_of_gradient(s, q, d, 1e-4) / error_of_gradient(s, q, d, 5e-5));
+    const double second = log2(error_of_hessian(s, q, d, 1e-4) / error_of_hessian(s, q, d, 5e-5));
+    right += fabs(order - 2) < 0.1 && fabs(second - 2) < 0.1;
+    tried++;
+  }
+  assert_true(tried > 20 && 10 * right > 7 * tried);
+  free(block);
+  bar_free(b);
+}
+
+// A step that begins turned over has parabolas, until every guard is above its limit; a step that
+// begins with a guard merely pressed flat keeps its walls.
+static void parabolas_come_and_go(void **state) {
+  (void)state;
+  bar *b = make(0.6);
+  void *block;
+  ep_state *s = bar_state(b, &block);
+  int turned = 0, flat = 0;
+  for (int i = 0; i < 100; i++) {
+    double least = 1;
+    bar_random_q(b, 0.03 * i, s->q);
+    for (int g = 0; g < GUARDS; g++)
+      least = fmin(least, jacobian(b, g, s->q) / b->model.guard_limit[g]);
+    for (int before = 0; before < 2; before++) {
+      s->guards_soft = before;
+      ep_guard_begin(s);
+      assert_int_equal(s->guards_soft, least < 0 || (before && least < 1));
+    }
+    turned += least<0, flat += least> 0 && least < 1;
+  }
+  assert_true(turned > 10 && flat > 10);
+  free(block);
+  bar_free(b);
+}
+
 // Where the parts meet, slope and curvature go on: from both sides the same.
 static void parts_meet_smoothly(void **state) {
   (void)state;
@@ -272,6 +327,23 @@ static void nearest(const bar *b, double factor, double *q) {
   }
 }
 
+// Random states too: with walls only, some of these stay jammed for ever.
+static void random_starts_recover(void **state) {
+  (void)state;
+  bar *b = bar_create(8, 3, 3, 20, 12, 0, 0, EP_STVK_VOLUME);
+  bar_add_guards(b, b->model.size.nt, 0.3);
+  int most, left, inverted = 0;
+  for (int i = 0; i < 10; i++) {
+    double q[20];
+    bar_random_q(b, 1 + 0.4 * i, q);
+    inverted += bar_inverted(b, q);
+    push(b, q, NULL, &most, &left);
+    assert_int_equal(left, 0);
+  }
+  assert_true(inverted > 100);
+  bar_free(b);
+}
+
 static void inverted_starts_recover(void **state) {
   (void)state;
   for (int factor = 1; factor <= 2; factor++) {
@@ -290,9 +362,11 @@ static void inverted_starts_recover(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(is_the_sum_of_the_walls),     cmocka_unit_test(derivatives_are_right),
+      cmocka_unit_test(parabolas_are_right),         cmocka_unit_test(parabolas_come_and_go),
       cmocka_unit_test(parts_meet_smoothly),         cmocka_unit_test(projection_is_semidefinite),
       cmocka_unit_test(memory_changes_nothing),      cmocka_unit_test(rest_is_untouched),
       cmocka_unit_test(a_hard_push_inverts_nothing), cmocka_unit_test(inverted_starts_recover),
+      cmocka_unit_test(random_starts_recover),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
