@@ -404,15 +404,9 @@ static ep_status make_job(const ep_shape *from, const ep_shape *to, job *j, ep_e
   return EP_OK;
 }
 
+// Regions left out are in the record; the caller, who knows the file, names them.
 static void say(const job *j, const ep_map *map) {
   const ep_map_quality *q = &map->quality;
-  for (int g = 0; g < q->regions; g++)
-    if (q->region[g].suspect)
-      ep_warn(j->log,
-              "region %d of %s fits region %d of %s better than its own partner (Jaccard %.2f): "
-              "left out of the map; check the order in the region file",
-              g + 1, j->from.shape->mesh->name, q->region[g].best_match + 1,
-              j->to.shape->mesh->name, q->region[g].jaccard);
   if (q->regions && q->coupled_functions < map->m)
     ep_notice(j->log, "%d regions alone determine %d of %d functions: positions do the rest",
               q->regions, q->coupled_functions, map->m);

@@ -136,11 +136,12 @@ static void frames_text(FILE *out, const ep_map_quality *q, const ep_mesh *from,
   fprintf(out, "  %-32s %7s %9s %8s\n", "frame", "score", "distance", "cycle");
   for (int i = 0; i < q->candidates; i++) {
     const ep_frame_candidate *c = &q->candidate[i];
+    if (c->alone && !c->against && !c->chosen)
+      continue; // the record has them; they say nothing new
     fprintf(out, "  %-32s %7.3f %9.3f %8.3f%s\n", c->name, c->score, c->distance, c->cycle,
             c->chosen    ? "  chosen"
-            : c->against ? "  contradicts the choice"
+            : c->against ? "  by the shapes alone: contradicts the choice"
             : c->rival   ? "  could be as well"
-            : c->alone   ? "  by the shapes alone"
                          : "");
   }
   if (q->settle_from >= 0 && q->settle_to >= 0 && q->settle_other >= 0)

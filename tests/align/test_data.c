@@ -76,17 +76,22 @@ static double jaccard(const data_set *d, int from, int to, const int *p) {
 }
 
 typedef struct table {
-  ep_map map[3][2]; // object <- rest, rest <- pose, object <- pose; automatic, with regions
+  // object <- rest, rest <- pose, object <- pose; automatic, with regions. Left out: empty
+  ep_map map[3][2];
   double jaccard[3][2], composed[2], seconds[3][2];
 } table;
 
-static void measure(const data_set *d, const char *name, int m, table *t) {
+// identical: the object is the rest shape. Its own map by regions (the same; test_map has regions
+// on one shape) and the direct automatic map to the pose claim nothing and are left out.
+static void measure(const data_set *d, const char *name, int m, bool identical, table *t) {
   static const int pairs[3][2] = {{0, 1}, {1, 2}, {0, 2}};
   ep_error err = {0};
+  memset(t, 0, sizeof *t);
   printf("%-9s m %2d  %-16s %-8s  Jaccard  cycle  covered  Dirichlet  turn  seconds  verdict\n",
          name, m, "map", "from");
   for (int i = 0; i < 3; i++)
     for (int regions = 0; regions < 2; regions++) {
+      if (identical && ((i == 0 && regions) || (i == 2 && !regions))) continue;
       ep_map_options o = ep_default_map_options();
       o.m = m;
       o.same_family = i == 1;
@@ -108,8 +113,8 @@ static void measure(const data_set *d, const char *name, int m, table *t) {
     }
   for (int regions = 0; regions < 2; regions++) {
     ep_map composed;
-    if (ep_map_compose(&t->map[0][regions], &d->s[1].mesh, &t->map[1][regions], &d->s[2].mesh,
-                       &composed, &err) != EP_OK)
+    if (ep_map_compose(&t->map[0][identical ? 0 : regions], &d->s[1].mesh, &t->map[1][regions],
+                       &d->s[2].mesh, &composed, &err) != EP_OK)
       fail_msg("%s", err.text);
     t->composed[regions] = jaccard(d, 0, 2, composed.p);
     printf("%14s %-16s %-8s   %.3f\n", "", "composed", regions ? "regions" : "nothing",
@@ -152,7 +157,7 @@ static void car_maps_itself(void **state) {
   data_set d;
   if (!load(&d, "car", "car.veg", "car.ini")) skip();
   table t;
-  measure(&d, "car", 10, &t);
+  measure(&d, "car", 10, false, &t);
   show_residuals(&t.map[0][1]);
   // Thresholds stand a few hundredths below the first measurement.
   assert_true(t.jaccard[0][0] > 0.93 && t.jaccard[0][1] > 0.95);
@@ -174,7 +179,7 @@ static void gorillas_swapped_regions_are_named(void **state) {
   if (!load(&d, "gorilla", "gorilla.veg", "gorilla.ini")) skip();
   d.wrong = wrong;
   table t;
-  measure(&d, "gorilla", 10, &t);
+  measure(&d, "gorilla", 10, false, &t);
   show_residuals(&t.map[0][1]);
   // Example regions 12, 13, 14 match object regions 14, 12, 13.
   for (int i = 0; i < 3; i += 2) {
@@ -201,11 +206,10 @@ static void letter_is_itself_and_bends(void **state) {
   data_set d;
   if (!load(&d, "letter-c", "C.veg", "C.ini")) skip();
   table t;
-  measure(&d, "letter-c", 20, &t);
+  measure(&d, "letter-c", 20, true, &t);
   show_residuals(&t.map[2][1]);
   for (int i = 0; i < d.s[0].mesh.nv; i++) {
     assert_int_equal(t.map[0][0].p[i], i);
-    assert_int_equal(t.map[0][1].p[i], i);
   }
   assert_true(t.jaccard[1][0] > 0.7 && t.jaccard[1][1] > 0.92);
   assert_true(t.composed[1] > t.jaccard[2][1] - 0.01);
