@@ -8,9 +8,9 @@
 
 #include "base/files.h"
 #include "cubature/cubature.h"
-#include "linalg/petsc.h"
 #include "mesh/io.h"
 #include "tests/bake/bar.h"
+#include "tests/petsc_session.h"
 
 static const char *const car = EP_SOURCE_DIR "/../shared/data/car/car.veg";
 enum { SIZES = 6 };
@@ -68,10 +68,6 @@ static void test_car(void **state) {
 }
 
 int main(void) {
-  ep_error err = {0};
-  if (ep_petsc_start(&err) != EP_OK) return 1;
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_car)};
-  const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-  ep_petsc_stop();
-  return failed;
+  return cmocka_run_group_tests(tests, session_start, session_stop);
 }

@@ -5,9 +5,9 @@
 // inverted while it is pushed nor afterwards; without the guards some are.
 #include "cubature/forces.h"
 #include "cubature/guards.h"
-#include "linalg/petsc.h"
 #include "reduced/bake/model_build.h"
 #include "tests/bake/bar.h"
+#include "tests/petsc_session.h"
 
 enum { R = 20, ELEMENTS = 16 };
 
@@ -173,14 +173,10 @@ static void test_hard_pushes_invert_nothing(void **state) {
 }
 
 int main(void) {
-  ep_error err = {0};
-  if (ep_petsc_start(&err) != EP_OK) return 1;
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_repeatable_and_bounded),
       cmocka_unit_test(test_examples_are_left_free),
       cmocka_unit_test(test_hard_pushes_invert_nothing),
   };
-  const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-  ep_petsc_stop();
-  return failed;
+  return cmocka_run_group_tests(tests, session_start, session_stop);
 }

@@ -6,8 +6,8 @@
 #include "cubature/cubature.h"
 #include "cubature/select.h"
 #include "cubature/system.h"
-#include "linalg/petsc.h"
 #include "tests/bake/bar.h"
+#include "tests/petsc_session.h"
 
 enum { R = 12, EXAMPLES = 2 };
 
@@ -435,8 +435,6 @@ static void test_refuses(void **state) {
 }
 
 int main(void) {
-  ep_error err = {0};
-  if (ep_petsc_start(&err) != EP_OK) return 1;
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_forces_add_up),
       cmocka_unit_test(test_relative_forces),
@@ -449,7 +447,5 @@ int main(void) {
       cmocka_unit_test(test_inverted_example),
       cmocka_unit_test(test_refuses),
   };
-  const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-  ep_petsc_stop();
-  return failed;
+  return cmocka_run_group_tests(tests, session_start, session_stop);
 }
