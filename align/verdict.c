@@ -60,7 +60,7 @@ static void weigh_rivals(const ep_mesh *from, const ep_mesh *to, ep_map_quality 
     snprintf(at, (size_t)(end - at),
              " fit%s as well: nothing tells them apart. One landmark settles it: vertex %d of %s "
              "with vertex %d of %s, as mapped now, or with %d (numbers of the files, from 1); or "
-             "say that the authored frame is right",
+             "give map: {frame: authored} where it is right",
              q->rivals > 1 ? "" : "s", from->file_vertex[q->settle_from] + 1, file_name(from),
              to->file_vertex[q->settle_to] + 1, file_name(to),
              to->file_vertex[q->settle_other] + 1);

@@ -1,5 +1,5 @@
 // OpenBLAS 0.3.21 does not know recent processors and falls back to its slowest kernels there
-// (6 GFLOP/s instead of 45 on one core: DESIGN section 7).
+// (6 GFLOP/s instead of 45 on one core).
 #ifndef EP_APP_BLAS_CORE_H
 #define EP_APP_BLAS_CORE_H
 

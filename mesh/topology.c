@@ -77,8 +77,8 @@ static void join(int *parent, int a, int b) {
 }
 
 // Corners around a vertex are joined across the edges they share; a vertex with more than one group
-// of corners is pinched. seen (nv) is -1, or -2 where a
-// vertex is not to be counted, and receives the first group.
+// of corners is pinched. seen (nv) is -1, or -2 where a vertex is not to be counted, and receives
+// the first group.
 static void find_pinches(const int *triangle, int corners, int *parent, int *seen,
                          ep_mesh_topology *out) {
   for (int i = 0; i < corners; i++) {

@@ -380,7 +380,8 @@ static ep_status add_solid(writer *w, json_t *root, const ep_gltf_solid *solid, 
   own.vertex = NULL, own.index = NULL, own.low = NULL, own.range = NULL;
   own.base = NULL, own.base_normal = NULL, own.position = NULL, own.normal = NULL;
   json_t *primitive = json_object();
-  ep_status status = primitive ? make_index(&own) : EP_ERR_MEMORY;
+  ep_status status =
+      primitive ? make_index(&own) : ep_fail(w->err, EP_ERR_MEMORY, "no memory for glTF text");
   if (status == EP_OK) status = make_ranges(&own);
   if (status == EP_OK) status = add_primitive(&own, primitive);
   w->bin = own.bin, w->used = own.used, w->capacity = own.capacity;
@@ -459,7 +460,8 @@ static ep_status write_container(const char *path, const char *text, const write
 
 static ep_status write_all(const char *path, writer *w, json_t *root) {
   json_t *primitive = json_object();
-  ep_status status = primitive ? add_primitive(w, primitive) : EP_ERR_MEMORY;
+  ep_status status = primitive ? add_primitive(w, primitive)
+                               : ep_fail(w->err, EP_ERR_MEMORY, "no memory for glTF text");
   if (status == EP_OK) add_mesh(w, root, primitive);
   json_decref(primitive);
   EP_TRY(status);

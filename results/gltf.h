@@ -7,10 +7,6 @@
 
 #include "base/error.h"
 
-// Blender clamps weights to [0, 1], so each mode is shifted and scaled to its own range over the
-// trajectory: base shape X + sum_a U_a min_a, target a = U_a (max_a - min_a), weight a =
-// (q_a - min_a) / (max_a - min_a), 0 where a mode does not move. Hence base + sum of weight x
-// target = X + U q up to single precision. Only vertices that triangles use are stored.
 // A rigid body beside the object. Arrays are borrowed.
 typedef struct ep_gltf_solid {
   int n;           // vertices of x; only those its triangles use are stored
@@ -21,6 +17,10 @@ typedef struct ep_gltf_solid {
   const double *pose;  // (frames x 12) position (3) and rotation (row-major 9) in every frame
 } ep_gltf_solid;
 
+// Blender clamps weights to [0, 1], so each mode is shifted and scaled to its own range over the
+// trajectory: base shape X + sum_a U_a min_a, target a = U_a (max_a - min_a), weight a =
+// (q_a - min_a) / (max_a - min_a), 0 where a mode does not move. Hence base + sum of weight x
+// target = X + U q up to single precision. Only vertices that triangles use are stored.
 typedef struct ep_gltf_animation {
   const char *name;    // of the node and the mesh
   int n, r, frames;    // vertices, modes (0: a still), frames (0: a still at rest)

@@ -273,9 +273,8 @@ static double lowest(const ep_view *view, int first, int last, const ep_panel *p
   return low;
 }
 
-static ep_status draw_label(const ep_view *view, ep_image *image, double middle, double baseline,
-                            double room, const char *text, double size, ep_error *err) {
-  (void)view;
+static ep_status draw_label(ep_image *image, double middle, double baseline, double room,
+                            const char *text, double size, ep_error *err) {
   const double width = ep_text_width(size, text);
   const double fitted = width > room ? size * room / width : size; // shrink rather than cut
   return ep_image_text(image, middle - ep_text_width(fitted, text) / 2, baseline, fitted, ink, text,
@@ -290,7 +289,7 @@ static ep_status draw_note(const ep_view *view, ep_image *image, ep_error *err) 
     const size_t length = line_of(at, size, room, &next);
     memcpy(line, at, length);
     line[length] = 0;
-    EP_TRY(draw_label(view, image, image->width / 2.0, baseline, room, line, size, err));
+    EP_TRY(draw_label(image, image->width / 2.0, baseline, room, line, size, err));
   }
   return EP_OK;
 }
@@ -310,7 +309,7 @@ static ep_status draw_panels(const ep_view *view, const layout *l, int panels,
     const int top = l->title + p / l->columns * (view->height + l->label);
     EP_TRY(draw_panel(view, &panel[p], frame, &camera, ground, image, left, top, err));
     if (panel[p].label)
-      EP_TRY(draw_label(view, image, left + view->width / 2.0,
+      EP_TRY(draw_label(image, left + view->width / 2.0,
                         top + view->height + 1.3 * view->label_size, view->width - 8.0,
                         panel[p].label, view->label_size, err));
   }
@@ -333,7 +332,7 @@ ep_status ep_picture_render(const ep_view *view, int panels, const ep_panel *pan
     ep_frame_free(&frame);
   }
   if (status == EP_OK && view->title)
-    status = draw_label(view, out, out->width / 2.0, 2.2 * view->label_size, out->width - 16.0,
+    status = draw_label(out, out->width / 2.0, 2.2 * view->label_size, out->width - 16.0,
                         view->title, 1.3 * view->label_size, err);
   if (status == EP_OK) status = draw_note(view, out, err);
   if (status != EP_OK) ep_image_free(out);

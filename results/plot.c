@@ -26,7 +26,8 @@ void ep_plot_ticks(double low, double high, int wanted, double *first, double *s
   const double rough = (high - low) / wanted, ten = pow(10, floor(log10(rough)));
   const double digit = rough / ten;
   *step = ten * (digit <= 1 ? 1 : digit <= 2 ? 2 : digit <= 5 ? 5 : 10);
-  const double start = floor(low / *step + 1e-9), end = ceil(high / *step - 1e-9);
+  // A time of 60 steps of 0.0166666667 s is 1 s: no empty interval for what rounding leaves over.
+  const double start = floor(low / *step + 1e-6), end = ceil(high / *step - 1e-6);
   *first = start * *step;
   *count = (int)(end - start);
 }

@@ -14,7 +14,7 @@ typedef struct ep_plot {
 } ep_plot;
 
 // A range of round numbers around low..high in steps of 1, 2 or 5 times a power of ten.
-//   *first <= low, first + count step >= high; about `wanted` steps.
+//   *first <= low, first + count step >= high, but for 1e-6 of a step; about `wanted` steps.
 void ep_plot_ticks(double low, double high, int wanted, double *first, double *step, int *count);
 
 // Errors: EP_ERR_ARGUMENT (fewer than 2 points, no line, x not ascending, no finite value).

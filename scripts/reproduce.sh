@@ -13,16 +13,16 @@ cmake --build build --target eigenpose_command
 out=${1:-out/reproduce}
 mkdir -p "$out"
 # Two runs at a time would disturb each other's times: one after the other, each on its own.
-total=$(ls data/scenes/zhao2018/*.yaml data/scenes/zhang2015/*.yaml | wc -l)
+set -- data/scenes/zhao2018/*.yaml data/scenes/zhang2015/*.yaml
 count=0
 failed=
-for scene in data/scenes/zhao2018/*.yaml data/scenes/zhang2015/*.yaml; do
+for scene in "$@"; do
   name=$(basename "$(dirname "$scene")")/$(basename "$scene" .yaml)
   folder=$out/$name
   count=$((count + 1))
   rm -rf "$folder"
   mkdir -p "$folder"
-  printf '[%d/%d] %s ... ' "$count" "$total" "$name"
+  printf '[%d/%d] %s ... ' "$count" "$#" "$name"
   started=$(date +%s)
   if build/eigenpose plan "$scene" --json >"$folder/plan.json" 2>"$folder/run.log" &&
     build/eigenpose run "$scene" --out "$folder" --quiet >"$folder/summary.log" 2>"$folder/run.log"; then

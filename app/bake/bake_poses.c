@@ -1,4 +1,4 @@
-// Example poses on the object's mesh (DESIGN "Descriptors", "Example poses on the object's mesh").
+// Example poses on the object's mesh: maps, descriptors, as-rigid-as-possible (lbspace/lbspace.h).
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

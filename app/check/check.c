@@ -120,13 +120,14 @@ static ep_status repair(const ep_cli *cli, ep_check *check, ep_error *err) {
   ep_check after = {0};
   EP_TRY(ep_mesh_repair(&old->mesh, &r, &mesh, &findings, err));
   ep_status status = write_mesh(cli->repair, &mesh, err);
-  fprintf(
-      stderr,
-      "eigenpose: %s: %d tets turned round, %d without volume, %d repeated and %d of other parts "
-      "left out; %d vertices joined, %d unused left out\n",
-      cli->repair, old->findings.repaired_orientation, r.degenerate_tets,
-      old->findings.repeated_tets + r.repeated_tets, r.left_out_tets, r.merged_vertices,
-      old->findings.unused_vertices);
+  if (status == EP_OK && !cli->quiet)
+    fprintf(
+        stderr,
+        "eigenpose: %s: %d tets turned round, %d without volume, %d repeated and %d of other parts "
+        "left out; %d vertices joined, %d unused left out\n",
+        cli->repair, old->findings.repaired_orientation, r.degenerate_tets,
+        old->findings.repeated_tets + r.repeated_tets, r.left_out_tets, r.merged_vertices,
+        old->findings.unused_vertices);
   if (status == EP_OK)
     status = ep_check_mesh_take(&after, cli->repair, &mesh, &findings, NULL, err);
   ep_mesh_free(&mesh);

@@ -16,12 +16,12 @@ json_t *ep_quality_json(const ep_map_quality *quality, const ep_mesh *from, cons
 void ep_quality_text(FILE *out, const char *name, const ep_map_quality *quality,
                      const ep_mesh *from, const ep_mesh *to);
 
-// {inverted_tets, inverted_before, .., repair_shift}: a pose on the object's mesh.
+// {inverted_tets, inverted_before_repair, .., iterations}: a pose on the object's mesh.
 json_t *ep_pose_json(const ep_pose_quality *quality);
-// [{name, ..}] of all examples; empty before ep_bake_poses.
 // Regions of local examples: elements and errors of the cubature in each.
 json_t *ep_regions_json(const ep_bake *bake);
 void ep_regions_text(FILE *out, const ep_bake *bake);
+// [{name, ..}] of all examples; empty before ep_bake_poses.
 json_t *ep_poses_json(const ep_bake *bake);
 void ep_pose_text(FILE *out, const char *name, const ep_pose_quality *quality);
 

@@ -18,7 +18,7 @@ static const int stage_version[] = {
     [EP_STAGE_FRAME] = 1, [EP_STAGE_GUARDS] = 2,
 };
 
-// Matching raises the number of functions to 20 (DESIGN "Maps"), between the rest shape and a pose
+// Matching raises the number of functions to 20 (align/match.c), between the rest shape and a pose
 // of one family to 32; coupling uses 2 m.
 enum { MATCH_FUNCTIONS = 25, MATCH_FAMILY = 32 };
 

@@ -1,5 +1,5 @@
 // Claim: kernels made for older processors are replaced by what the processor can do, good kernels
-// are left alone (DESIGN section 7).
+// are left alone (app/blas_core.h).
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
