@@ -46,6 +46,11 @@ void ep_solve_lower_transposed(int n, const double *l, double *x) {
 
 enum { MAX_BACKTRACKS = 40 };
 
+// A Newton step that gains less than this share of the energies' round-off brings nothing, unless
+// the gradient still falls: in floats a nearly incompressible polynomial stalls above the
+// tolerance.
+static const double no_gain = 1e-3;
+
 // A Newton step which strains no element by more than this is lost in the round-off of forces:
 // converged whatever the residual; the larger one where energies no longer tell points apart.
 static const double tiny_strain = 1e-13, small_strain = 1e-9;
@@ -70,15 +75,20 @@ static int factor_hessian(ep_state *state, ep_newton *newton) {
 }
 
 // Armijo along state->direction; leaves the new point, its gradient and energy. `noise`: energies
-// closer than this are equal to round-off, then the gradient decides. Returns the step, 0: none.
+// closer than this are equal to round-off; where not much more is to be gained, the gradient
+// decides. Returns the step, 0: none.
 static double line_search(ep_state *state, ep_newton *newton, double slope, double noise) {
   const int r = newton->n;
+  const double flat = ep_dot(r, state->g, state->g);
   double step = 1;
   for (int i = 0; i < MAX_BACKTRACKS; i++, step *= 0.5) {
     for (int a = 0; a < r; a++) state->trial[a] = state->x[a] + step * state->direction[a];
     double energy = newton->energy(newton->user, state->trial, state->trial_g, NULL, 0);
     newton->evaluations++;
-    if (energy <= newton->energy_now + 1e-4 * step * slope + noise) { // false for NaN
+    const int lower = energy <= newton->energy_now + 1e-4 * step * slope + noise; // 0 for NaN
+    const int flatter = -slope <= 10 * noise && isfinite(energy) &&
+                        ep_dot(r, state->trial_g, state->trial_g) < 0.25 * flat;
+    if (lower || flatter) {
       newton->energy_now = energy;
       memcpy(state->x, state->trial, (size_t)r * sizeof *state->x);
       memcpy(state->g, state->trial_g, (size_t)r * sizeof *state->g);
@@ -91,6 +101,7 @@ static double line_search(ep_state *state, ep_newton *newton, double slope, doub
 
 ep_status ep_newton_minimise(ep_state *state, ep_newton *newton) {
   const int r = newton->n;
+  double before = INFINITY; // residual of the point before
   newton->energy_now = newton->energy(newton->user, state->x, state->g, NULL, 0);
   newton->evaluations++;
   for (;;) {
@@ -110,6 +121,8 @@ ep_status ep_newton_minimise(ep_state *state, ep_newton *newton) {
     const double terms = newton->cancelling ? *newton->cancelling : 0;
     double noise = state->energy_noise * (fmax(terms, fabs(newton->energy_now)) + fabs(slope)) +
                    1e-15 * sqrt(fabs(newton->energy_now) * state->energy_scale);
+    if (-slope <= no_gain * noise && newton->residual_now > 0.5 * before) return EP_OK;
+    before = newton->residual_now;
     double strain = state->strain_scale * sqrt(ep_dot(r, state->direction, state->direction));
     double step = line_search(state, newton, slope, noise);
     if (step > 0 && newton->refresh)

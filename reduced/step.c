@@ -82,6 +82,9 @@ static double inner_energy(ep_step_run *s, const double *x, double *g, double *h
   if (g) s->internal = sqrt(ep_dot(state->model->size.r, g, g));
   s->strains = ep_green_potential(state, &green, x, g, h, project);
   s->cancelling = fabs(s->elastic) + fabs(s->strains);
+  // what a polynomial in floats sums up is as large as its quadratic part, however much cancels
+  if (state->model->evaluator == EP_EVALUATE_CUBIC_FLOAT)
+    s->cancelling += 0.5 * share * add_k0(s, 0, x, NULL, NULL);
   return s->elastic + s->pull + s->strains;
 }
 
