@@ -56,13 +56,29 @@ static void draw_load(ep_random *rng, const random_scene *s, double amount, rand
   }
 }
 
-static void draw_obstacle(ep_random *rng, double speed, random_obstacle *out) {
+// Of the solid about the middle of its lattice's axis.
+static double radius_of(const random_solid *solid) {
+  ep_mesh mesh = solid_mesh(solid);
+  double square = 0;
+  for (int v = 0; v < mesh.nv; v++) {
+    const double *x = mesh.x + 3 * v;
+    square = fmax(square, pow(x[0] - 0.5, 2) + x[1] * x[1] + x[2] * x[2]);
+  }
+  ep_mesh_free(&mesh);
+  return sqrt(square);
+}
+
+// Beside the object, however it is turned at the start; not tame ones may stand in it.
+static void draw_obstacle(ep_random *rng, const random_scene *s, double speed,
+                          random_obstacle *out) {
   *out = (random_obstacle){.kind = (solid_obstacle)ep_random_below(rng, 3),
                            .radius = between(rng, 0.1, 0.4),
                            .friction = chance(rng, 0.5) ? between(rng, 0, 1) : 0,
                            .moves = chance(rng, 0.4)};
   direction(rng, out->normal);
-  const double away = out->kind == IS_PLANE ? between(rng, 0.3, 0.8) : between(rng, 1, 1.3);
+  static const double reach[] = {[IS_PLANE] = 0, [IS_SPHERE] = 1, [IS_BOX] = 1.8};
+  const double gap = between(rng, s->tame ? 0.01 : -0.5, 0.1);
+  const double away = radius_of(&s->object) + reach[out->kind] * out->radius + gap;
   for (int i = 0; i < 3; i++) out->point[i] = (i ? 0 : 0.5) - away * out->normal[i];
   for (int i = 0; i < 3; i++) out->move[i] = speed * 0.3 * out->normal[i];
 }
@@ -135,9 +151,9 @@ static void draw_examples(ep_random *rng, random_scene *s) {
   }
 }
 
-random_scene draw_scene(uint64_t seed) {
+random_scene draw_scene(uint64_t seed, double wild) {
   ep_random own = ep_random_seed(seed, 5), *rng = &own;
-  random_scene s = {.seed = seed, .tame = chance(rng, 0.75), .object = draw_solid(rng)};
+  random_scene s = {.seed = seed, .tame = !chance(rng, wild), .object = draw_solid(rng)};
   const double amount = s.tame ? between(rng, 0.01, 0.4) : between_powers(rng, 0.01, 1e3);
   s.held = chance(rng, 0.65);
   s.two_parts = !s.tame && chance(rng, 0.1);
@@ -151,7 +167,7 @@ random_scene draw_scene(uint64_t seed) {
   s.loads = ep_random_below(rng, LOADS_MOST + 1);
   for (int i = 0; i < s.loads; i++) draw_load(rng, &s, amount, &s.load[i]);
   s.obstacles = chance(rng, 0.3) ? from_to(rng, 1, OBSTACLES_MOST) : 0;
-  for (int i = 0; i < s.obstacles; i++) draw_obstacle(rng, 1 + amount, &s.obstacle[i]);
+  for (int i = 0; i < s.obstacles; i++) draw_obstacle(rng, &s, 1 + amount, &s.obstacle[i]);
   some_vector(rng, chance(rng, 0.5) ? 2 * amount : 0, s.velocity);
   some_vector(rng, chance(rng, 0.5) ? 5 * amount : 0, s.spin);
   direction(rng, s.axis);
@@ -160,9 +176,11 @@ random_scene draw_scene(uint64_t seed) {
   return s;
 }
 
-placement draw_scene_placement(ep_random *rng) {
+placement draw_scene_placement(const random_scene *s, ep_random *rng) {
   placement at = draw_placement(rng);
-  at.unit = pow(2, from_to(rng, -10, 10));
+  bool drags = false;
+  for (int i = 0; i < s->loads; i++) drags = drags || s->load[i].kind == LOAD_DRAG;
+  if (drags) at.unit = pow(2, from_to(rng, -10, 5));
   return at;
 }
 

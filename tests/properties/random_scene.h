@@ -64,9 +64,10 @@ typedef struct random_scene {
   uint64_t off; // bits of the pieces left out (shrinking)
 } random_scene;
 
-random_scene draw_scene(uint64_t seed);
+// wild: share of the scenes that are not tame.
+random_scene draw_scene(uint64_t seed, double wild);
 // Placement for a scene: units a drag's stiffness can be written in.
-placement draw_scene_placement(ep_random *rng);
+placement draw_scene_placement(const random_scene *s, ep_random *rng);
 
 // scene.yaml and its meshes into the folder, which is made. Returns the number of pieces a scene
 // has that may be left out. to (nv of the object, or NULL): as in placed_mesh.

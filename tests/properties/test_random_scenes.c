@@ -99,7 +99,7 @@ static bool failed_well(const char *folder, int code, char *said, char *why) {
 static bool run_once(const random_scene *s, const char *folder, char *why, int *code) {
   char command[60];
   ep_random rng = ep_random_seed(s->seed, 6);
-  const placement at = draw_scene_placement(&rng);
+  const placement at = draw_scene_placement(s, &rng);
   if (shell("rm -rf %s", folder) != 0) return breaks(why, "%s cannot be removed", folder);
   write_scene(s, &at, folder, NULL);
   snprintf(command, sizeof command, "timeout %d", SECONDS_MOST);
@@ -137,7 +137,7 @@ static bool same_again(const random_scene *s, const char *folder, char *why) {
 static void make_smaller(random_scene *s, const char *folder, char *why) {
   int code;
   ep_random rng = ep_random_seed(s->seed, 6);
-  const placement at = draw_scene_placement(&rng);
+  const placement at = draw_scene_placement(s, &rng);
   const int pieces = write_scene(s, &at, folder, NULL);
   for (int i = 0; i < pieces && i < 64; i++) {
     random_scene smaller = *s;
@@ -154,7 +154,7 @@ static void scenes_end_well(void **state) {
   (void)state;
   seeds all = seeds_begin(8);
   while (seeds_next(&all)) {
-    random_scene s = draw_scene(all.now);
+    random_scene s = draw_scene(all.now, 0.25);
     char folder[40], why[WHY] = "";
     int code;
     snprintf(folder, sizeof folder, "scene-%llu", (unsigned long long)all.now);
