@@ -79,8 +79,16 @@ typedef struct ep_map_quality {
   double orthogonality;                   // |A^T A - I| max
   double determinant;                     // of A, +-1
   double coverage;                        // share of the example's volume hit by the map
-  double cycle;                           // round trip rms / radius of gyration; -1 where not made
-  double handed;     // share of the volume around whose vertices the map keeps left and right
+  double cycle; // round trip rms / radius of gyration before the two maps were made inverse to each
+                // other, when they knew nothing of each other; -1 where not made
+  // Elastic refinement of the map together with its reverse: energy (volumes 1) and rms distortion,
+  // 0 where parts move rigidly. Where the round trip was long, plain nearest neighbours were
+  // refined too and the lower energy kept.
+  double energy, energy_other; // of the one kept, of the other; -1 where there was no other
+  double distortion;
+  bool from_nearest; // the plain neighbours were kept
+  double handed; // share of the volume around whose vertices the map keeps left and right, before
+                 // that refinement
   double dirichlet;  // of the transferred coordinates over that of the own ones
   int near_multiple; // eigenfunctions in near-multiple groups at the cut or inside
   int reframe_rounds;

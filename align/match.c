@@ -261,6 +261,61 @@ ep_status ep_match_levels(const ep_side *from, const ep_side *to, const double r
   return status;
 }
 
+// The nearest points to those of from's vertices that are on the boundary (or those inside). A
+// vertex of the boundary goes to the boundary; one inside may go anywhere, also close to it.
+static ep_status match_layer(matcher *w, bool boundary, ep_point_map *map, ep_error *err) {
+  const ep_side *from = w->from, *to = w->to;
+  const int d = 3 + w->columns;
+  int *vertex = malloc((size_t)from->n * sizeof *vertex), count = 0;
+  ep_point_map part = {0};
+  ep_tree *tree = NULL;
+  ep_status status = vertex ? ep_point_map_make(from->n, &part, err)
+                            : ep_fail(err, EP_ERR_MEMORY, "no memory for %d points", from->n);
+  if (status == EP_OK) {
+    fill(w, from, from->phi, from->k, 0, w->smooth, w->query);
+    fill(w, to, NULL, 0, 0, w->turned, w->target);
+    for (int i = 0; i < from->n; i++) {
+      if ((from->skin[i] > 0) != boundary) continue;
+      memmove(w->query + (size_t)count * d, w->query + (size_t)i * d, (size_t)d * sizeof(double));
+      part.p[count] = map->p[i];
+      vertex[count++] = i;
+    }
+    status = ep_tree_make(to->n, d, w->target, &tree, err);
+  }
+  if (status == EP_OK) {
+    ep_tree_nearest(tree, count, w->query, part.p);
+    status = ep_points_project(to->shape->mesh, d, w->target, count, w->query, part.p, part.tet,
+                               part.weight, err);
+  }
+  for (int i = 0; i < count && status == EP_OK; i++) {
+    map->p[vertex[i]] = part.p[i];
+    map->tet[vertex[i]] = part.tet[i];
+    memcpy(map->weight + 4 * (size_t)vertex[i], part.weight + 4 * (size_t)i, 4 * sizeof(double));
+  }
+  ep_tree_free(tree);
+  ep_point_map_free(&part);
+  free(vertex);
+  return status;
+}
+
+ep_status ep_match_positions(const ep_side *from, const ep_side *to, const double r[9],
+                             const ep_match_rule *rule, const double *y, ep_point_map *map,
+                             ep_error *err) {
+  ep_side bare_from = *from, bare_to = *to;
+  ep_match_rule bare = *rule;
+  matcher w;
+  bare_from.marks = bare_to.marks = 0;
+  bare_from.splines = bare_to.splines = false;
+  bare.mark_weight = bare.region_weight = 0;
+  EP_TRY(make_matcher(&bare_from, &bare_to, r, &bare, &w, err));
+  memcpy(w.smooth, y, 3 * (size_t)from->n * sizeof *y);
+  ep_status status = match_layer(&w, true, map, err);
+  bare.skin_weight = 0;
+  if (status == EP_OK) status = match_layer(&w, false, map, err);
+  free_matcher(&w);
+  return status;
+}
+
 ep_status ep_match_plain(const ep_side *from, const ep_side *to, const double r[9], int *p,
                          int *tet, double *weight, ep_error *err) {
   double *turned = malloc(3 * (size_t)to->n * sizeof *turned);

@@ -138,3 +138,44 @@ ep_status ep_points_project(const ep_mesh *mesh, int d, const double *coords, in
   free_fans(&f);
   return EP_OK;
 }
+
+ep_status ep_point_map_make(int n, ep_point_map *out, ep_error *err) {
+  out->p = malloc((size_t)n * sizeof *out->p);
+  out->tet = malloc((size_t)n * sizeof *out->tet);
+  out->weight = malloc(4 * (size_t)n * sizeof *out->weight);
+  return out->p && out->tet && out->weight
+             ? EP_OK
+             : ep_fail(err, EP_ERR_MEMORY, "no memory for a map of %d vertices", n);
+}
+
+void ep_point_map_free(ep_point_map *map) {
+  free(map->p);
+  free(map->tet);
+  free(map->weight);
+  *map = (ep_point_map){0};
+}
+
+ep_status ep_point_map_from_vertices(int n, const ep_mesh *to, ep_point_map *map, ep_error *err) {
+  int *corner = malloc((size_t)to->nv * sizeof *corner); // 4 tet + which of its corners
+  if (!corner) return ep_fail(err, EP_ERR_MEMORY, "no memory for the tets of %s", to->name);
+  for (int i = 0; i < 4 * to->nt; i++) corner[to->tet[i]] = i;
+  for (int i = 0; i < n; i++) {
+    map->tet[i] = corner[map->p[i]] / 4;
+    for (int k = 0; k < 4; k++) map->weight[4 * (size_t)i + k] = k == corner[map->p[i]] % 4;
+  }
+  free(corner);
+  return EP_OK;
+}
+
+void ep_point_map_pull(const ep_point_map *map, int n, const ep_mesh *to, int width,
+                       const double *values, double *out) {
+  for (int i = 0; i < n; i++) {
+    const int *corner = to->tet + 4 * (size_t)map->tet[i];
+    const double *w = map->weight + 4 * (size_t)i;
+    for (int c = 0; c < width; c++) {
+      double sum = 0;
+      for (int j = 0; j < 4; j++) sum += w[j] * values[(size_t)corner[j] * width + c];
+      out[(size_t)i * width + c] = sum;
+    }
+  }
+}

@@ -27,6 +27,20 @@ ep_status ep_points_project(const ep_mesh *mesh, int d, const double *coords, in
                             const double *query, const int *start, int *tet, double *weight,
                             ep_error *err);
 
+// A map to points in tets: for each vertex the nearest vertex of the other mesh, the tet that holds
+// its image and the image's barycentric coordinates there.
+typedef struct ep_point_map {
+  int *p, *tet;   // (n)
+  double *weight; // (n x 4)
+} ep_point_map;
+ep_status ep_point_map_make(int n, ep_point_map *out, ep_error *err);
+void ep_point_map_free(ep_point_map *map);
+// tet and weight of the vertices p of `to`.
+ep_status ep_point_map_from_vertices(int n, const ep_mesh *to, ep_point_map *map, ep_error *err);
+// out (n x width) = values (to's vertices x width) at the images.
+void ep_point_map_pull(const ep_point_map *map, int n, const ep_mesh *to, int width,
+                       const double *values, double *out);
+
 // ---- side.c: a shape made scale-free: centred at its centroid, lengths over V^(1/3), functions
 // times sqrt(V), so that both sides of a map are comparable.
 typedef struct ep_side {
@@ -100,6 +114,7 @@ typedef struct ep_match_rule {
   double region_weight;     // weight of regions, 0 without
   double mark_weight;       // weight of landmarks, 0 without
   double skin_weight;       // weight of being on the boundary
+  double stiffness;         // of the elastic refinement, against distances (volumes 1)
   bool refine;              // p is a map already: the last level only, or those from
   int first;                // this number of functions on; 0: the last
   const unsigned char *use; // (regions) which take part, NULL: all
@@ -117,8 +132,24 @@ ep_status ep_match_plain(const ep_side *from, const ep_side *to, const double r[
 // C (k x k) = Phi_from^T M Phi_to[p], scale-free.
 ep_status ep_match_functional(const ep_side *from, const ep_side *to, const int *p, double *c,
                               ep_error *err);
+// The points of `to` nearest to y (from->n x 3, in from's frame), those of the boundary on the
+// boundary: map (p in: where the search starts). Functions, landmarks and regions take no part:
+// regions in wrong order would pull farther with every round.
+ep_status ep_match_positions(const ep_side *from, const ep_side *to, const double r[9],
+                             const ep_match_rule *rule, const double *y, ep_point_map *map,
+                             ep_error *err);
 // Round trip from -> to -> from: rms over the rms radius.
 double ep_match_cycle(const ep_side *from, const int *p, const int *back);
+
+// ---- elastic.c: both maps of a pair made smooth and inverse to each other.
+typedef struct ep_elastic_quality {
+  double energy;     // what was minimised, both ways (volumes 1): lower is the likelier map
+  double distortion; // rms of |grad y - R| both ways: 0 where every part moves rigidly
+} ep_elastic_quality;
+// In frame r (to's frame -> from's). there, back: in: maps of points; out: the refined ones.
+ep_status ep_elastic_refine(const ep_side *from, const ep_side *to, const double r[9],
+                            const ep_match_rule *rule, ep_point_map *there, ep_point_map *back,
+                            ep_elastic_quality *quality, ep_error *err);
 
 // ---- trial.c: a map there and back from one start frame.
 typedef struct ep_trial {
@@ -213,9 +244,14 @@ ep_status ep_region_overlap(const ep_side *from, const ep_side *to, const int *p
 // better.
 void ep_region_suspects(int regions, const double *overlap, const unsigned char *use,
                         unsigned char *suspect, int *best);
-// Fill map->quality (cycle, frame, rounds given by the caller) and the verdict. use (regions) says
-// which regions took part; dropped ones are recorded as suspect.
-// same_family: larger turns of the frame are expected.
+// Share of the volume around whose vertices the images of the tets have, together, the handedness
+// of the tets: a map that exchanges left and right inside a shape, or folds it, loses it there. r:
+// to's frame -> from's.
+ep_status ep_map_handedness(const ep_side *from, const ep_side *to, const double r[9],
+                            const ep_point_map *map, double *handed, ep_error *err);
+// Fill map->quality (cycle, handed, frame, rounds given by the caller) and the verdict. use
+// (regions) says which regions took part; dropped ones are recorded as suspect. same_family: larger
+// turns of the frame are expected.
 ep_status ep_map_judge(const ep_side *from, const ep_side *to, const unsigned char *use,
                        bool same_family, ep_map *map, ep_error *err);
 // ---- verdict.c

@@ -151,26 +151,24 @@ static double signed_volume(const double *x, const int *v) {
   return ep_frame_determinant(d);
 }
 
-// Share of the volume around whose vertices the images of the tets have, together, the handedness
-// of the tets: a map that exchanges left and right inside a shape, or folds it, loses it there.
-static ep_status judge_handedness(const ep_side *from, const ep_side *to, ep_map *map,
-                                  ep_error *err) {
+ep_status ep_map_handedness(const ep_side *from, const ep_side *to, const double r[9],
+                            const ep_point_map *map, double *handed, ep_error *err) {
   const ep_mesh *mesh = from->shape->mesh;
   double *image = malloc(3 * (size_t)from->n * sizeof *image);
   double *star = calloc((size_t)from->n, sizeof *star);
   ep_status status =
       image && star ? EP_OK : ep_fail(err, EP_ERR_MEMORY, "no memory to judge a map");
   if (status == EP_OK) {
-    const double side = ep_frame_determinant(map->rotation) < 0 ? -1 : 1;
-    ep_map_pull(map, to->shape->mesh, 3, to->x, image);
+    const double side = ep_frame_determinant(r) < 0 ? -1 : 1;
+    ep_point_map_pull(map, from->n, to->shape->mesh, 3, to->x, image);
     for (int e = 0; e < mesh->nt; e++) {
       const int *v = mesh->tet + 4 * (size_t)e;
       const double turned = signed_volume(from->x, v) < 0 ? -side : side;
       for (int c = 0; c < 4; c++) star[v[c]] += turned * signed_volume(image, v);
     }
-    map->quality.handed = 0;
+    *handed = 0;
     for (int i = 0; i < from->n; i++)
-      if (star[i] > 0) map->quality.handed += from->share[i];
+      if (star[i] > 0) *handed += from->share[i];
   }
   free(image);
   free(star);
@@ -344,7 +342,6 @@ ep_status ep_map_judge(const ep_side *from, const ep_side *to, const unsigned ch
                        bool same_family, ep_map *map, ep_error *err) {
   EP_TRY(judge_basis(from, map, err));
   EP_TRY(judge_points(from, to, map, err));
-  EP_TRY(judge_handedness(from, to, map, err));
   if (use) EP_TRY(judge_regions(from, to, use, map, err));
   ep_map_verdict(from->shape->mesh, to->shape->mesh, same_family, map);
   return EP_OK;

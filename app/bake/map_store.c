@@ -14,6 +14,10 @@
   X(coverage)                                                                                      \
   X(cycle)                                                                                         \
   X(handed)                                                                                        \
+  X(energy)                                                                                        \
+  X(energy_other)                                                                                  \
+  X(distortion)                                                                                    \
+  X(from_nearest)                                                                                  \
   X(dirichlet)                                                                                     \
   X(near_multiple)                                                                                 \
   X(reframe_rounds)                                                                                \

@@ -75,6 +75,8 @@ static void set_numbers(json_t *object, const ep_map_quality *q) {
       {"coverage", q->coverage},
       {"cycle", q->cycle},
       {"handed", q->handed},
+      {"energy", q->energy},
+      {"distortion", q->distortion},
       {"dirichlet", q->dirichlet},
       {"frame_angle", q->frame_angle},
       {"landmark_residual", q->landmark_residual},
@@ -93,6 +95,9 @@ static void set_numbers(json_t *object, const ep_map_quality *q) {
   };
   for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
     json_object_set_new(object, numbers[i].key, ep_json_number(numbers[i].value));
+  json_object_set_new(object, "energy_other",
+                      q->energy_other < 0 ? json_null() : ep_json_number(q->energy_other));
+  json_object_set_new(object, "from_nearest", json_boolean(q->from_nearest));
   for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) // -1: not told
     json_object_set_new(object, counts[i].key,
                         counts[i].value < 0 ? json_null() : json_integer(counts[i].value));
@@ -183,6 +188,11 @@ void ep_quality_text(FILE *out, const char *name, const ep_map_quality *q, const
       "  coverage %.3f, round trip %.3f, left and right kept %.3f, Dirichlet %.3f, frame turned "
       "by %.1f degrees\n",
       q->coverage, q->cycle, q->handed, q->dirichlet, q->frame_angle);
+  fprintf(out, "  distortion %.3f, energy %.4f", q->distortion, q->energy);
+  if (q->energy_other >= 0)
+    fprintf(out, "; refined from %s, %.4f from the other",
+            q->from_nearest ? "nearest points" : "the matching", q->energy_other);
+  fprintf(out, "\n");
   landmarks_text(out, q);
   frames_text(out, q, from, to);
   regions_text(out, q);

@@ -160,8 +160,8 @@ static void car_maps_itself(void **state) {
   measure(&d, "car", 10, false, &t);
   show_residuals(&t.map[0][1]);
   // Thresholds stand a few hundredths below the first measurement.
-  assert_true(t.jaccard[0][0] > 0.93 && t.jaccard[0][1] > 0.95);
-  assert_true(t.jaccard[1][0] > 0.88 && t.jaccard[1][1] > 0.95);
+  assert_true(t.jaccard[0][0] > 0.9 && t.jaccard[0][1] > 0.96);
+  assert_true(t.jaccard[1][0] > 0.89 && t.jaccard[1][1] > 0.96);
   assert_true(t.composed[0] > t.jaccard[2][0]); // composed better than independent
   for (int i = 0; i < 6; i++) assert_int_equal(t.map[i / 2][i % 2].quality.verdict, EP_MAP_GOOD);
   const ep_map_quality *q = &t.map[0][1].quality;
