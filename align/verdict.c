@@ -5,7 +5,7 @@
 
 #include "align/private.h"
 
-// Thresholds from bench_verdict: some 440 maps of known truth between 19 pairs of shapes, with
+// Thresholds from bench_verdict: 413 maps of known truth between 19 pairs of shapes, with
 // nothing, sensible and wrong landmarks and regions, and turned examples (docs/maps.md).
 // Round trip: right maps with nothing given <= .25 but for plane to fish (.35) and bird to fish
 // (.52); with landmarks or regions <= .38 (bird to fish with regions .46); one landmark far off

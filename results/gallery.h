@@ -11,6 +11,8 @@ typedef struct ep_gallery_item {
   const double *x;    // (nv x 3) positions, NULL: rest
   const float *color; // (nv x 3) sRGB per vertex, or NULL: tint
   const char *label;  // or NULL
+  int dots;           // places shown as dots, the i-th of every item in the same colour
+  const double *dot;  // (dots x 3)
 } ep_gallery_item;
 
 // Every item a panel, all in one scale where view->shared. edges as in ep_drawing.

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "app/maps/quality_json.h"
+#include "app/scene/landmarks.h"
 #include "linalg/dense.h"
 #include "mesh/io.h"
 #include "results/colors.h"
@@ -58,6 +59,9 @@ typedef struct map_view {
   double *images;                 // (from->nv x 3) those of the images
   float *color_from, *color_to;   // (nv x 3)
   double *own, *coupled, *pulled; // (functions x nv) of from, of to, of to carried to from
+  // places shown on both: the landmarks given, else the one that would settle the frame
+  int dots;
+  double dot[2][3 * EP_LANDMARKS_MAX];
 } map_view;
 
 static void free_view(map_view *v) {
@@ -68,6 +72,41 @@ static void free_view(map_view *v) {
   free(v->own);
   free(v->coupled);
   free(v->pulled);
+}
+
+// Dot at a vertex, or where a point was given at the vertex nearest to it: on the mesh.
+static void place_dot(const ep_mesh *mesh, const double *x, int vertex, const double at[3],
+                      double *out) {
+  double least = HUGE_VAL;
+  for (int v = 0; v < mesh->nv && vertex < 0; v++) {
+    double d2 = 0;
+    for (int a = 0; a < 3; a++) d2 += pow(x[3 * (size_t)v + (size_t)a] - at[a], 2);
+    if (d2 >= least) continue;
+    least = d2;
+    memcpy(out, x + 3 * (size_t)v, 3 * sizeof *out);
+  }
+  if (vertex >= 0) memcpy(out, x + 3 * (size_t)vertex, 3 * sizeof *out);
+}
+
+static ep_status fill_dots(map_view *v, const ep_bake *bake, const ep_stage *stage, ep_error *err) {
+  static const double nowhere[3] = {0, 0, 0};
+  const ep_map_quality *q = &v->map->quality;
+  ep_landmark mark[EP_LANDMARKS_MAX];
+  EP_TRY(ep_landmarks_of_map(bake->scene, bake->shapes, stage->family, stage->from, stage->to, mark,
+                             &v->dots, err));
+  for (int m = 0; m < v->dots; m++) {
+    double there[3];
+    const double *r = v->map->rotation, *to = mark[m].to;
+    for (int a = 0; a < 3; a++)
+      there[a] = r[3 * a] * to[0] + r[3 * a + 1] * to[1] + r[3 * a + 2] * to[2];
+    place_dot(v->from, v->from->x, mark[m].from_vertex, mark[m].from, v->dot[0] + 3 * m);
+    place_dot(v->to, v->there, mark[m].to_vertex, there, v->dot[1] + 3 * m);
+  }
+  if (v->dots || q->settle_from < 0 || q->settle_to < 0) return EP_OK;
+  v->dots = 1;
+  place_dot(v->from, v->from->x, q->settle_from, nowhere, v->dot[0]);
+  place_dot(v->to, v->there, q->settle_to, nowhere, v->dot[1]);
+  return EP_OK;
 }
 
 static ep_status fill_view(map_view *v, ep_error *err) {
@@ -100,20 +139,33 @@ static ep_status fill_view(map_view *v, ep_error *err) {
 }
 
 static ep_status draw_colors(const map_view *v, const char *path, ep_error *err) {
-  char label[2][100], title[240];
+  char label[2][100], title[240], note[sizeof v->map->quality.reasons + 16];
   const char *reasons = v->map->quality.reasons;
   snprintf(label[0], sizeof label[0], "%s, coloured by its images", v->from_name);
   snprintf(label[1], sizeof label[1], "%s, coloured by position", v->to_name);
   snprintf(title, sizeof title, "%.70s -> %.70s: the map is %s", v->from_name, v->to_name,
            ep_verdict_name(v->map->quality.verdict));
-  const ep_gallery_item item[2] = {{v->from, NULL, v->color_from, label[0]},
-                                   {v->to, v->there, v->color_to, label[1]}};
+  const ep_gallery_item item[2] = {{.mesh = v->from,
+                                    .color = v->color_from,
+                                    .label = label[0],
+                                    .dots = v->dots,
+                                    .dot = v->dot[0]},
+                                   {.mesh = v->to,
+                                    .x = v->there,
+                                    .color = v->color_to,
+                                    .label = label[1],
+                                    .dots = v->dots,
+                                    .dot = v->dot[1]}};
   ep_view view = ep_default_view();
   view.shared = false;
   view.width = 560;
   view.height = 460;
   view.title = title;
-  view.note = *reasons ? reasons : "same colour where mapped";
+  if (*reasons)
+    snprintf(note, sizeof note, "%s%s", reasons, v->map->quality.settle_from < 0 ? "" : " (dot)");
+  else
+    snprintf(note, sizeof note, "same colour where mapped%s", v->dots ? "; dots: landmarks" : "");
+  view.note = note;
   return ep_gallery_poses(path, &view, 2, item, 0, err);
 }
 
@@ -132,8 +184,9 @@ static ep_status draw_functions(const map_view *v, const char *path, ep_error *e
     ep_color_values(v->to->nv, v->coupled + j * k, -most, most, EP_COLORS_DIVERGING, below);
     snprintf(label[j], sizeof label[j], "%s: function %zu", v->from_name, j + 1);
     snprintf(label[f + j], sizeof label[f + j], "%s: coupled %zu", v->to_name, j + 1);
-    item[j] = (ep_gallery_item){v->from, NULL, above, label[j]};
-    item[f + j] = (ep_gallery_item){v->to, v->there, below, label[f + j]};
+    item[j] = (ep_gallery_item){.mesh = v->from, .color = above, .label = label[j]};
+    item[f + j] =
+        (ep_gallery_item){.mesh = v->to, .x = v->there, .color = below, .label = label[f + j]};
   }
   ep_view view = ep_default_view();
   view.shared = false;
@@ -223,6 +276,7 @@ ep_status ep_align_view_map(const char *folder, ep_bake *bake, const ep_stage *s
                 .to_name = to->name,
                 .functions = map->m < FUNCTIONS ? map->m : FUNCTIONS};
   ep_status status = fill_view(&v, err);
+  if (status == EP_OK) status = fill_dots(&v, bake, stage, err);
   if (status == EP_OK) status = leave_map(&v, folder, stage->name, err);
   free_view(&v);
   return status;
@@ -369,10 +423,13 @@ static ep_status draw_pose(const pose_view *v, const char *name, const char *res
   snprintf(label[1], sizeof label[1], "example in its pose: %.80s", name);
   pose_note(v, q, sizeof note, note);
   const ep_gallery_item item[4] = {
-      {v->rest, v->rest_x, v->rest_color, label[0]},
-      {v->pose, v->pose_x, v->pose_color, label[1]},
-      {v->object, NULL, v->object_color, "object at rest"},
-      {v->object, v->object_x, v->object_color, "object in that pose"}};
+      {.mesh = v->rest, .x = v->rest_x, .color = v->rest_color, .label = label[0]},
+      {.mesh = v->pose, .x = v->pose_x, .color = v->pose_color, .label = label[1]},
+      {.mesh = v->object, .color = v->object_color, .label = "object at rest"},
+      {.mesh = v->object,
+       .x = v->object_x,
+       .color = v->object_color,
+       .label = "object in that pose"}};
   ep_view view = ep_default_view();
   view.shared = false;
   view.columns = 2;

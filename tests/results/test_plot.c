@@ -86,10 +86,21 @@ static void test_galleries(void **state) {
   ep_view view = ep_default_view();
   view.width = 100, view.height = 80;
   const ep_gallery_item item[3] = {
-      {&mesh, NULL, NULL, NULL}, {&mesh, x, NULL, NULL}, {&mesh, NULL, NULL, NULL}};
+      {.mesh = &mesh}, {.mesh = &mesh, .x = x, .dots = 1, .dot = x}, {.mesh = &mesh}};
   int size[2];
   assert_int_equal(ep_gallery_poses("poses.png", &view, 3, item, 0.4f, &err), EP_OK);
   png_size("poses.png", size);
+  // a dot is seen: without it the picture is another one
+  const ep_gallery_item plain[3] = {{.mesh = &mesh}, {.mesh = &mesh, .x = x}, {.mesh = &mesh}};
+  assert_int_equal(ep_gallery_poses("plain.png", &view, 3, plain, 0.4f, &err), EP_OK);
+  assert_int_not_equal(system("cmp -s poses.png plain.png"), 0);
+  // a note takes lines of its own, above the panels
+  view.note = "a note that is longer than one line of so small a picture, so that it is broken";
+  assert_int_equal(ep_gallery_poses("noted.png", &view, 3, plain, 0.4f, &err), EP_OK);
+  view.note = NULL;
+  int noted[2];
+  png_size("noted.png", noted);
+  assert_true(noted[0] == 300 && noted[1] > 80 + 2 * 10);
   assert_true(size[0] == 300 && size[1] == 80);
   const double phi[10] = {-1, 0, 0, 0, 1, 1, -1, 0, 0, 0}, value[2] = {1.5, 2.5};
   assert_int_equal(ep_gallery_functions("phi.png", &view, &mesh, 2, phi, value, &err), EP_OK);
