@@ -24,6 +24,7 @@
 #include "app/compare/compare.h"
 #include "box.h"
 #include "program.h"
+#include "tests/near.h"
 
 #define ASSERT_OK(call)                                                                            \
   do {                                                                                             \
@@ -49,11 +50,11 @@ static void errors_are_what_they_say(void **state) {
   run.x[9] += 3, run.x[10] += 4; // second vertex of the second frame: 5 away
   for (int i = 0; i < 3; i++) reference.energy[i] = 10.0 * i, run.energy[i] = 10.0 * i - 1;
   ASSERT_OK(ep_compare_errors(&run, &reference, 50, &point, err));
-  assert_float_equal(point.position_error, 0.1, 1e-14);
-  assert_float_equal(point.error_at[0], 0, 0);
-  assert_float_equal(point.error_at[1], 0.1, 1e-14);
-  assert_float_equal(point.velocity_error, 1, 1e-14);
-  assert_float_equal(point.energy_error, 1.0 / 20, 1e-14);
+  ASSERT_NEAR(point.position_error, 0.1, 1e-14);
+  ASSERT_NEAR(point.error_at[0], 0, 0);
+  ASSERT_NEAR(point.error_at[1], 0.1, 1e-14);
+  ASSERT_NEAR(point.velocity_error, 1, 1e-14);
+  ASSERT_NEAR(point.energy_error, 1.0 / 20, 1e-14);
   free(point.error_at);
   ep_frames_free(&reference);
   ep_frames_free(&run);
@@ -97,7 +98,7 @@ static void crossover_of_power_laws(void **state) {
   ep_crossover x[EP_CROSSOVERS];
   char text[EP_CROSSOVER_TEXT];
   assert_int_equal(ep_compare_crossovers(&c, 60, x), 1);
-  assert_float_equal(x[0].r, 16, 1e-9);
+  ASSERT_NEAR(x[0].r, 16, 1e-9);
   ep_compare_crossover_text(&c, 60, &x[0], text);
   assert_non_null(strstr(text, "overtakes the cubic polynomials at r = 16"));
   assert_int_equal(ep_compare_crossovers(&c, 30, x), 0); // not compared
@@ -109,7 +110,7 @@ static void crossover_of_power_laws(void **state) {
   assert_non_null(strstr(text, "at r = 40 its step takes 2 times"));
   for (int i = 0; i < 6; i += 2) point[i].step_median_us = 1; // faster everywhere
   assert_int_equal(ep_compare_crossovers(&c, 60, x), 1);
-  assert_float_equal(x[0].r, 10, 0);
+  ASSERT_NEAR(x[0].r, 10, 0);
   ep_compare_crossover_text(&c, 60, &x[0], text);
   assert_non_null(strstr(text, "the crossover lies below"));
 }
@@ -130,9 +131,9 @@ static void crossover_of_floats_is_their_own(void **state) {
   ep_crossover x[EP_CROSSOVERS];
   assert_int_equal(ep_compare_crossovers(&c, 60, x), 2);
   assert_int_equal(x[0].precision, EP_DOUBLE);
-  assert_float_equal(x[0].r, 16, 1e-9);
+  ASSERT_NEAR(x[0].r, 16, 1e-9);
   assert_int_equal(x[1].precision, EP_FLOAT);
-  assert_float_equal(x[1].r, 32, 1e-9);
+  ASSERT_NEAR(x[1].r, 32, 1e-9);
 }
 
 static void budgets_decide(void **state) {
@@ -259,8 +260,8 @@ static void the_program_compares(void **state) {
   if (command(call) != 0) fail_msg("%s", text_of("err.txt"));
   json_t *second = report();
   assert_int_equal(cached_points(second), points - 1);
-  assert_float_equal(number(point_of(second, "all", 12, "newton"), "position_error"),
-                     number(point_of(first, "all", 12, "newton"), "position_error"), 1e-15);
+  ASSERT_NEAR(number(point_of(second, "all", 12, "newton"), "position_error"),
+              number(point_of(first, "all", 12, "newton"), "position_error"), 1e-15);
   json_decref(first);
   json_decref(second);
   free(csv);

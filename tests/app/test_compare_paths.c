@@ -26,6 +26,7 @@
 #include "box.h"
 #include "program.h"
 #include "reduced/eigenpose.h"
+#include "tests/near.h"
 
 static const char scene_text[] =
     "schema: 1\nname: beam\nobject: {mesh: beam.veg}\n"
@@ -84,7 +85,7 @@ static void check_points(const json_t *root) {
   }
   const json_t *all = point_of(root, "all", "green", 10);
   const json_t *cubic = point_of(root, "cubic", "green", 10);
-  assert_float_equal(number(all, "position_error"), number(cubic, "position_error"), 1e-10);
+  ASSERT_NEAR(number(all, "position_error"), number(cubic, "position_error"), 1e-10);
   assert_true(number(cubic, "target_median_us") == 0);
   assert_true(number(point_of(root, "cubic", "lb", 10), "target_median_us") > 0);
 }
@@ -102,8 +103,8 @@ static void check_frames(const json_t *root, const char *csv) {
     value[count] = strtod(row, &end);
     if (*end != ',') break;
   }
-  assert_float_equal(value[0], 20 * 0.02, 1e-9); // time
-  double expected[3];                            // weights of lb, green; green apart from lb
+  ASSERT_NEAR(value[0], 20 * 0.02, 1e-9); // time
+  double expected[3];                     // weights of lb, green; green apart from lb
   for (size_t i = 0; i < 2; i++) {
     const json_t *run = json_array_get(paths, i);
     const json_t *at = json_array_get(json_object_get(run, "weights_at"), frames - 1);
@@ -117,7 +118,7 @@ static void check_frames(const json_t *root, const char *csv) {
   expected[2] = 100 * json_number_value(json_array_get(apart, frames - 1));
   assert_true(expected[2] > 0.01);
   for (int i = 0; i < 3; i++)
-    assert_float_equal(value[count - 2 + i], expected[i], 1e-7 * (1 + fabs(expected[i])));
+    ASSERT_NEAR(value[count - 2 + i], expected[i], 1e-7 * (1 + fabs(expected[i])));
 }
 
 static void both_paths_are_measured(void **state) {

@@ -15,6 +15,7 @@
 #include "base/random.h"
 #include "mesh/mesh.h"
 #include "reduced/bake/fem.h"
+#include "tests/near.h"
 
 #define ASSERT_OK(call)                                                                            \
   do {                                                                                             \
@@ -27,15 +28,6 @@
   do {                                                                                             \
     double a_ = (a), b_ = (b);                                                                     \
     if (!(a_ < b_)) fail_msg("%s = %.6g is not below %s = %.6g", #a, a_, #b, b_);                  \
-  } while (0)
-
-// In doubles: cmocka's assert_float_equal compares in floats, to 6e-8 at best.
-#define ASSERT_NEAR(a, b, tolerance)                                                               \
-  do {                                                                                             \
-    double a_ = (a), b_ = (b), t_ = (tolerance);                                                   \
-    if (!(fabs(a_ - b_) <= t_))                                                                    \
-      fail_msg("%s = %.17g and %s = %.17g are %.3g apart, above %.3g", #a, a_, #b, b_,             \
-               fabs(a_ - b_), t_);                                                                 \
   } while (0)
 
 typedef struct bar {

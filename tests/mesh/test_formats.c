@@ -3,6 +3,7 @@
 #include <locale.h>
 
 #include "tests/mesh/bytes.h"
+#include "tests/near.h"
 
 static void expect_cube(ep_mesh_format format, const bytes *b, int dropped) {
   ep_mesh_findings f;
@@ -54,9 +55,9 @@ static void veg_materials_by_region(void **state) {
   assert_cube(&m);
   assert_int_equal(m.nmaterials, 2);
   assert_memory_equal(m.tet_material, expected, sizeof expected);
-  assert_float_equal(m.material[1].density, 2000, 0);
-  assert_float_equal(m.material[1].young, 2e9, 0);
-  assert_float_equal(m.material[1].poisson, 0.3, 0);
+  ASSERT_NEAR(m.material[1].density, 2000, 0);
+  ASSERT_NEAR(m.material[1].young, 2e9, 0);
+  ASSERT_NEAR(m.material[1].poisson, 0.3, 0);
   ep_mesh_free(&m);
 }
 
@@ -352,12 +353,12 @@ static void locale_does_not_matter(void **state) {
   put(&b, "*VERTICES\n4 3 0 0\n0 0 0 0\n1 1.5 0 0\n2 0 1 0\n3 0 0 1\n*ELEMENTS\nTET\n1 4 0\n"
           "0 0 1 2 3\n");
   ep_mesh m = parse_ok(EP_MESH_VEG, &b, NULL);
-  assert_float_equal(m.x[3], 1.5, 0);
+  ASSERT_NEAR(m.x[3], 1.5, 0);
   ep_error err = {0};
   assert_ok(ep_mesh_write_veg("locale.veg", &m, &err), &err);
   ep_mesh_free(&m);
   assert_ok(ep_mesh_read("locale.veg", &m, NULL, NULL, &err), &err);
-  assert_float_equal(m.x[3], 1.5, 0);
+  ASSERT_NEAR(m.x[3], 1.5, 0);
   ep_mesh_free(&m);
   assert_int_equal(localeconv()->decimal_point[0], ',');
   setlocale(LC_ALL, "C");

@@ -4,6 +4,7 @@
 
 #include "mesh/io.h"
 #include "tests/mesh/shapes.h"
+#include "tests/near.h"
 
 static const char box[] = "Mesh.MeshSizeMax = 0.5;\n"
                           "Point(1) = {0, 0, 0}; Point(2) = {2, 0, 0}; Line(1) = {1, 2};\n"
@@ -47,13 +48,15 @@ static void every_format_gives_the_same_mesh(void **state) {
   for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
     run(kinds[i].file, kinds[i].options);
     ep_mesh m = read_one(kinds[i].file);
-    assert_float_equal(ep_mesh_volume(&m), 2, 1e-12); // coordinates have 16 digits
+    ASSERT_NEAR(ep_mesh_volume(&m), 2, 1e-12); // coordinates have 16 digits
     if (i == 0) {
       first = m;
       continue;
     }
     assert_true(ep_mesh_same_connectivity(&first, &m));
-    for (int k = 0; k < 3 * m.nv; k++) assert_float_equal(m.x[k], first.x[k], 1e-14);
+    // Gmsh writes 16 digits, into .mesh 14: half of the last one, of coordinates from 1 to 10.
+    const double digits = strcmp(kinds[i].file, "a.mesh") == 0 ? 5.1e-14 : 1e-14;
+    for (int k = 0; k < 3 * m.nv; k++) ASSERT_NEAR(m.x[k], first.x[k], digits);
     ep_mesh_free(&m);
   }
   ep_mesh_free(&first);
