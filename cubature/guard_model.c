@@ -9,7 +9,7 @@
 
 // A guard resists below this share of its volume; below this part of the share that an example or
 // the pose itself leaves it, so that no guard stands between the object and an example.
-static const double wall_begins = 0.3, of_example = 0.5;
+static const double wall_begins = 0.15, of_example = 0.5;
 static const double pi = 3.14159265358979323846;
 enum { STEPS_A_PERIOD = 24, HALVINGS = 4, POWER_ITERATIONS = 30 };
 

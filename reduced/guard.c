@@ -53,21 +53,23 @@ static double way_of(const ep_state *state, int e, double *jacobian) {
   return room > 0 ? way_to(f, cof, room) : 0; // false for NaN
 }
 
-// Could a guard of this group be at its limit?
-static int to_be_evaluated(ep_state *state, int group, const double *q) {
+// Could a guard of this group be at its limit? (state->padded_q holds q and zeros.)
+static int to_be_evaluated(ep_state *state, int group) {
   const ep_model *m = state->model;
-  const int r = m->size.r, first = EP_LANES * group;
+  const int width = EP_LANES * m->size.blocks, first = EP_LANES * group;
   const int end = m->size.guards < first + EP_LANES ? m->size.guards : first + EP_LANES;
-  double *at = state->guard_at + (size_t)group * (size_t)r;
-  const double *growth = m->guard_growth + (size_t)group * (size_t)(EP_LANES * m->size.blocks);
-  double sum[4] = {0};
-  for (int a = 0; a < r; a++) sum[a % 4] += fabs(q[a] - at[a]) * growth[a];
-  const double gone = (sum[0] + sum[1]) + (sum[2] + sum[3]);
+  double *at = state->guard_at + (size_t)group * (size_t)width;
+  const double *growth = m->guard_growth + (size_t)group * (size_t)width, *q = state->padded_q;
+  double sum[EP_LANES] = {0};
+  for (int b = 0; b < width; b += EP_LANES)
+    for (int i = 0; i < EP_LANES; i++) sum[i] += fabs(q[b + i] - at[b + i]) * growth[b + i];
+  const double gone =
+      ((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7]));
   if (gone < state->guard_reach[group] * (1 - slack)) return 0;
   double reach = INFINITY, jacobian;
   for (int e = first; e < end && reach > 0; e++) reach = fmin(reach, way_of(state, e, &jacobian));
   if (!isfinite(reach)) reach = 0; // overflow: nothing is known
-  memcpy(at, q, (size_t)r * sizeof *at);
+  memcpy(at, q, (size_t)width * sizeof *at);
   state->guard_reach[group] = reach;
   return !(reach > 0);
 }
@@ -101,7 +103,7 @@ double ep_guard_add(ep_state *state, const double *q, double *f, double *h, int 
   double energy = 0;
   if (groups > 0) memcpy(state->padded_q, q, (size_t)r * sizeof *q); // its tail stays zero
   for (int group = 0; group < groups; group++) {
-    if (!to_be_evaluated(state, group, q)) continue;
+    if (!to_be_evaluated(state, group)) continue;
     const double part = evaluate(state, group, f != NULL, h != NULL, project);
     if (part == 0) continue; // NaN goes on
     energy += part;
@@ -119,7 +121,7 @@ void ep_guard_begin(ep_state *state) {
   int turned_over = 0;
   if (groups > 0) memcpy(state->padded_q, state->q, (size_t)m->size.r * sizeof *state->q);
   for (int group = 0; group < groups; group++) {
-    if (!to_be_evaluated(state, group, state->q)) continue;
+    if (!to_be_evaluated(state, group)) continue;
     touched = 1;
     for (int e = EP_LANES * group; e < m->size.guards && e < EP_LANES * (group + 1); e++) {
       double jacobian;

@@ -9,8 +9,9 @@
 //
 // A wall also stands in the way back: an object that is put turned over would stay jammed between
 // walls. So a step that begins with a guard turned over (J < 0) has parabolas in their place,
-// s (x - 1)^2 / 2, and so have those after it until every guard is above its limit: there both are
-// zero, so the change back adds no energy; the change to parabolas takes some away.
+// s k (J - limit)^2 / 2, and so have those after it until every guard
+// is above its limit: there both are zero, so the change back adds no energy; the change to
+// parabolas takes some away.
 //
 // What is far from its limit is not looked at: of every group of 8 guards the state remembers where
 // it was looked at last, q_0, and how far F may go from there before any of the group can reach its
@@ -27,8 +28,8 @@
 // the force of the wall where J is a third of the limit.
 #define EP_GUARD_STIFFNESS 10.0
 
-// s of the parabolas: the strength of the material's own penalty.
-#define EP_GUARD_SOFTNESS 0.1
+// s: a fifth of the material's own penalty. As strong as it, parabolas of many guards jam too.
+#define EP_GUARD_SOFTNESS 0.2
 
 struct ep_state;
 

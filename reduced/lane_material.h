@@ -143,12 +143,14 @@ LANE_INLINE lane lane_wall(lane x, lane *slope, lane *curvature) {
   return (first + lane_all(0.5) * *curvature * past) * past - gap * gap * l;
 }
 
-LANE_INLINE lane lane_parabola(lane x, lane *slope, lane *curvature) {
-  const lane one = lane_all(1), zero = lane_all(0), soft = lane_all(EP_GUARD_SOFTNESS);
+// s (limit (x - 1))^2 / 2 = s (J - limit)^2 / 2 below 1.
+LANE_INLINE lane lane_parabola(lane x, lane limit, lane *slope, lane *curvature) {
+  const lane one = lane_all(1), zero = lane_all(0);
+  const lane square = lane_all(EP_GUARD_SOFTNESS) * limit * limit;
   const lane gap = lane_select(x < one, x - one, zero);
-  *curvature = lane_select(x < one, soft, zero);
-  *slope = soft * gap;
-  return lane_all(0.5) * soft * gap * gap;
+  *curvature = lane_select(x < one, square, zero);
+  *slope = square * gap;
+  return lane_all(0.5) * square * gap * gap;
 }
 
 LANE_INLINE lane lane_guard(int soft, lane stiffness, lane limit, const lane f[9], lane *p,
@@ -156,8 +158,8 @@ LANE_INLINE lane lane_guard(int soft, lane stiffness, lane limit, const lane f[9
   const lane one = lane_all(1), safe = lane_select(limit > lane_all(0), limit, one);
   lane slope, curvature, c[9];
   const lane x = lane_determinant(f) / safe;
-  const lane psi =
-      stiffness * (soft ? lane_parabola(x, &slope, &curvature) : lane_wall(x, &slope, &curvature));
+  const lane psi = stiffness * (soft ? lane_parabola(x, safe, &slope, &curvature)
+                                     : lane_wall(x, &slope, &curvature));
   if (!p) return psi;
   lane_cofactor(f, c);
   slope *= stiffness / safe;

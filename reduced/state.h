@@ -54,7 +54,7 @@
   X(cubic_at, cubic_words ? r : 0)                                                                \
   X(cubic_f, cubic_words ? r : 0)                                                                 \
   X(cubic_k, cubic_words ? r * r : 0)                                                             \
-  X(guard_at, guard_groups * r) /* guards: where each group was looked at, and its way from there */ \
+  X(guard_at, guard_groups * width) /* guards: where each group was looked at, and its way from there */ \
   X(guard_reach, guard_groups)                                                                    \
   X(green_y0, greens)      /* Green-strain path (reduced/green.c) */                              \
   X(green_y, greens)                                                                              \
