@@ -67,7 +67,7 @@ static bool save_rows(FILE *file, const ep_image *image, save_context *context) 
                PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                PNG_FILTER_TYPE_DEFAULT);
   png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
-  png_set_compression_level(png, 9);
+  png_set_compression_level(png, 6); // 9: 8 per cent smaller, for three times the time
   png_write_info(png, info);
   for (int y = 0; y < image->height; y++)
     png_write_row(png, image->rgb + 3 * (size_t)y * (size_t)image->width);

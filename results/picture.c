@@ -219,6 +219,8 @@ static void paint_background(ep_image *image, const ep_view *view) {
 // Average the samples of each pixel in linear light, over the background and its shadow.
 static void resolve(const ep_frame *frame, int samples, const ep_shadow *shadow,
                     const ep_camera *camera, ep_image *image, int left, int top) {
+  double linear[256];
+  for (int v = 0; v < 256; v++) linear[v] = ep_linear_from_srgb(v / 255.0);
   for (int y = 0; y < frame->height / samples; y++)
     for (int x = 0; x < frame->width / samples; x++) {
       double sum[3] = {0, 0, 0};
@@ -239,7 +241,7 @@ static void resolve(const ep_frame *frame, int samples, const ep_shadow *shadow,
       unsigned char *p =
           image->rgb + 3 * ((size_t)(top + y) * (size_t)image->width + (size_t)(left + x));
       for (int k = 0; k < 3; k++) {
-        const double behind = ep_linear_from_srgb(p[k] / 255.0) * (1 - dark);
+        const double behind = linear[p[k]] * (1 - dark);
         const double light = (sum[k] + (total - covered) * behind) / total;
         p[k] = (unsigned char)lround(255 * ep_srgb_from_linear(light));
       }

@@ -41,6 +41,7 @@ static json_t *entry(const json_t *root, const char *list, size_t index) {
 static void the_record_is_whole(void **state) {
   (void)state;
   json_t *root = good_report(program("", "align a-map.yaml --json --cache a-cache-1 --out a-one"));
+  assert_int_equal(system("cp out.txt a-first.txt"), 0);
   assert_int_equal(json_array_size(json_object_get(root, "maps")), 2);
   static const char *const keys[] = {"name",
                                      "from",
@@ -94,13 +95,14 @@ static void pictures_and_fields_are_left(void **state) {
     snprintf(path, sizeof path, "a-one/%s", files[i]);
     if (!ep_path_exists(path)) fail_msg("%s is missing", path);
   }
-  // from nothing, and from the cache: the same bytes, and the same record but for "cached"
-  assert_int_equal(program("", "align a-map.yaml --json --cache a-cache-2 --out a-two"), 0);
-  assert_int_equal(system("diff -r a-one a-two && cp out.txt a-first.txt"), 0);
-  assert_int_equal(program("", "align a-map.yaml --json --cache a-cache-2 --out a-three"), 0);
-  assert_int_equal(system("diff -r a-one a-three"), 0);
-  assert_int_equal(system("grep -v cached a-first.txt >a-x; grep -v cached out.txt | diff - a-x"),
-                   0);
+  // from nothing and from the cache the same pictures and fields; from nothing again the same
+  // record, and from the cache but for "cached"
+  assert_int_equal(program("", "align a-map.yaml --json --cache a-cache-1 --out a-two"), 0);
+  assert_int_equal(system("diff -r a-one a-two && cp out.txt a-cached.txt"), 0);
+  assert_int_equal(program("", "align a-map.yaml --json --cache a-cache-2"), 0);
+  assert_int_equal(system("diff a-first.txt out.txt"), 0);
+  assert_int_equal(
+      system("grep -v cached a-first.txt >a-x; grep -v cached a-cached.txt | diff - a-x"), 0);
   assert_int_equal(program("", "eigen a-beam.veg --count 3 --out a-one/phi.vtu"), 0);
   assert_true(ep_path_exists("a-one/phi.vtu") && ep_path_exists("a-one/phi.png"));
 }
