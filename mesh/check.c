@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "mesh/topology.h"
+
 static double longest_edge(const double *x, const int *v) {
   double longest = 0;
   for (int i = 0; i < 4; i++)
@@ -126,26 +128,10 @@ static ep_status count_duplicates(const ep_mesh *mesh, ep_mesh_findings *f, ep_e
   return EP_OK;
 }
 
-static int root_of(int *parent, int i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
-
-// Parts hang together where tets share a vertex.
 static ep_status count_components(const ep_mesh *mesh, ep_mesh_findings *f, ep_error *err) {
   int *parent = malloc((size_t)mesh->nv * sizeof *parent);
   if (!parent) return ep_fail(err, EP_ERR_MEMORY, "no memory to check the mesh %s", mesh->name);
-  for (int i = 0; i < mesh->nv; i++) parent[i] = i;
-  f->components = mesh->nv;
-  for (int i = 0; i < 4 * mesh->nt; i++) {
-    const int a = root_of(parent, mesh->tet[i]), b = root_of(parent, mesh->tet[i - i % 4]);
-    if (a == b) continue;
-    f->components--;
-    if (a < b)
-      parent[b] = a;
-    else
-      parent[a] = b;
-  }
+  f->components = ep_mesh_join_tets(mesh, parent);
   free(parent);
   return EP_OK;
 }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/forest.h"
 #include "mesh/check.h"
 #include "mesh/raw.h"
 #include "mesh/topology.h"
@@ -31,22 +32,11 @@ static int by_z(const void *a, const void *b) {
   return compare(s->x[2], t->x[2], s->v, t->v);
 }
 
-static int first_of(int *first, int v) {
-  while (first[v] != v) v = first[v] = first[first[v]];
-  return v;
-}
-
-static void join(int *first, int a, int b) {
-  a = first_of(first, a), b = first_of(first, b);
-  if (a < b) first[b] = a;
-  if (b < a) first[a] = b;
-}
-
 // Runs of points whose coordinates follow each other within `near`, one axis after the other; what
 // is still together behind the last is one place.
 static void join_runs(point *p, int count, int axis, double near, int *first) {
   static int (*const order[3])(const void *, const void *) = {by_x, by_y, by_z};
-  for (int i = 1; i < count && axis == 3; i++) join(first, p[0].v, p[i].v);
+  for (int i = 1; i < count && axis == 3; i++) ep_forest_join(first, p[0].v, p[i].v);
   if (axis == 3 || count < 2) return;
   qsort(p, (size_t)count, sizeof *p, order[axis]);
   for (int i = 0, n; i < count; i += n) {
@@ -60,12 +50,13 @@ ep_status ep_mesh_same_places(const ep_mesh *mesh, int *first, int *count, ep_er
   if (!p) return ep_fail(err, EP_ERR_MEMORY, "no memory to check the mesh %s", mesh->name);
   for (int v = 0; v < mesh->nv; v++) {
     memcpy(p[v].x, mesh->x + 3 * (size_t)v, sizeof p[v].x);
-    p[v].v = first[v] = v;
+    p[v].v = v;
   }
+  ep_forest_start(first, mesh->nv);
   join_runs(p, mesh->nv, 0, EP_SAME_PLACE * ep_mesh_diagonal(mesh), first);
   *count = 0;
   for (int v = 0; v < mesh->nv; v++) {
-    first[v] = first_of(first, v);
+    first[v] = ep_forest_root(first, v);
     *count += first[v] != v;
   }
   free(p);
@@ -156,7 +147,7 @@ static ep_status keep_largest(ep_mesh *mesh, ep_mesh_repairs *repairs, ep_mesh_f
   int *same = malloc((size_t)mesh->nv * sizeof *same);
   ep_status status =
       part && same ? EP_OK : ep_fail(err, EP_ERR_MEMORY, "no memory to repair %s", mesh->name);
-  for (int v = 0; v < mesh->nv && status == EP_OK; v++) same[v] = v;
+  if (status == EP_OK) ep_forest_start(same, mesh->nv);
   if (status == EP_OK) status = ep_mesh_parts(mesh, part, part + mesh->nt, &parts, err);
   if (status == EP_OK) status = copy_rest(mesh, &raw, err);
   if (status == EP_OK) status = copy_tets(mesh, same, part, &raw, repairs, err);

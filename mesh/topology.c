@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/forest.h"
+
 // ---- faces -------------------------------------------------------------------------------------
 
 typedef struct face {
@@ -65,24 +67,13 @@ static int compare_edges(const void *x, const void *y) {
   return (s->corner[0] > t->corner[0]) - (s->corner[0] < t->corner[0]);
 }
 
-static int root_of(int *parent, int i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
-
-static void join(int *parent, int a, int b) {
-  a = root_of(parent, a), b = root_of(parent, b);
-  if (a < b) parent[b] = a;
-  if (b < a) parent[a] = b;
-}
-
 // Corners around a vertex are joined across the edges they share; a vertex with more than one group
 // of corners is pinched. seen (nv) is -1, or -2 where a vertex is not to be counted, and receives
 // the first group.
 static void find_pinches(const int *triangle, int corners, int *parent, int *seen,
                          ep_mesh_topology *out) {
   for (int i = 0; i < corners; i++) {
-    const int v = triangle[i], group = root_of(parent, i);
+    const int v = triangle[i], group = ep_forest_root(parent, i);
     if (seen[v] == -1) seen[v] = group;
     if (seen[v] < 0 || seen[v] == group) continue;
     seen[v] = -2; // counted once
@@ -96,15 +87,15 @@ static void walk_surface(const int *triangle, int triangles, edge *e, int *paren
   for (int i = 0; i < corners; i++) {
     const int next = i % 3 == 2 ? i - 2 : i + 1, a = triangle[i], b = triangle[next];
     e[i] = a < b ? (edge){a, b, {i, next}} : (edge){b, a, {next, i}};
-    parent[i] = i;
   }
+  ep_forest_start(parent, corners);
   for (int v = 0; v < nv; v++) seen[v] = -1;
   qsort(e, (size_t)corners, sizeof *e, compare_edges);
   for (int i = 0, n; i < corners; i += n) {
     for (n = 1; i + n < corners && e[i + n].a == e[i].a && e[i + n].b == e[i].b;) n++;
     if (n == 2) {
-      join(parent, e[i].corner[0], e[i + 1].corner[0]);
-      join(parent, e[i].corner[1], e[i + 1].corner[1]);
+      ep_forest_join(parent, e[i].corner[0], e[i + 1].corner[0]);
+      ep_forest_join(parent, e[i].corner[1], e[i + 1].corner[1]);
       continue;
     }
     seen[e[i].a] = seen[e[i].b] = -2; // told with the edge
@@ -147,6 +138,14 @@ ep_status ep_mesh_examine(const ep_mesh *mesh, ep_mesh_topology *out, ep_error *
 
 // ---- parts -------------------------------------------------------------------------------------
 
+int ep_mesh_join_tets(const ep_mesh *mesh, int *parent) {
+  int parts = mesh->nv;
+  ep_forest_start(parent, mesh->nv);
+  for (int i = 0; i < 4 * mesh->nt; i++)
+    parts -= ep_forest_join(parent, mesh->tet[i], mesh->tet[i - i % 4]);
+  return parts;
+}
+
 typedef struct counted {
   int root, tets;
 } counted;
@@ -163,7 +162,7 @@ static void number_parts(const ep_mesh *mesh, int *parent, int *place, counted *
   for (int v = 0; v < mesh->nv; v++) place[v] = -1;
   *parts = 0;
   for (int e = 0; e < mesh->nt; e++) {
-    const int root = root_of(parent, mesh->tet[4 * e]);
+    const int root = ep_forest_root(parent, mesh->tet[4 * e]);
     if (place[root] < 0) {
       place[root] = *parts;
       list[(*parts)++] = (counted){.root = root};
@@ -175,7 +174,7 @@ static void number_parts(const ep_mesh *mesh, int *parent, int *place, counted *
     place[list[i].root] = i;
     size[i] = list[i].tets;
   }
-  for (int e = 0; e < mesh->nt; e++) part[e] = place[root_of(parent, mesh->tet[4 * e])];
+  for (int e = 0; e < mesh->nt; e++) part[e] = place[ep_forest_root(parent, mesh->tet[4 * e])];
 }
 
 ep_status ep_mesh_parts(const ep_mesh *mesh, int *part, int *size, int *parts, ep_error *err) {
@@ -184,8 +183,7 @@ ep_status ep_mesh_parts(const ep_mesh *mesh, int *part, int *size, int *parts, e
   counted *list = malloc((size_t)mesh->nt * sizeof *list);
   ep_status status = EP_OK;
   if (parent && place && list) {
-    for (int v = 0; v < mesh->nv; v++) parent[v] = v;
-    for (int i = 0; i < 4 * mesh->nt; i++) join(parent, mesh->tet[i], mesh->tet[i - i % 4]);
+    ep_mesh_join_tets(mesh, parent);
     number_parts(mesh, parent, place, list, part, size, parts);
   } else {
     status = ep_fail(err, EP_ERR_MEMORY, "no memory for the parts of %s", mesh->name);

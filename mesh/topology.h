@@ -15,6 +15,10 @@ typedef struct ep_mesh_topology {
 // Errors: EP_ERR_MEMORY.
 ep_status ep_mesh_examine(const ep_mesh *mesh, ep_mesh_topology *out, ep_error *err);
 
+// Joins the vertices of every tet in the forest parent (nv, base/forest.h). Returns the number of
+// parts: a part hangs together by shared vertices.
+int ep_mesh_join_tets(const ep_mesh *mesh, int *parent);
+
 // The part each tet belongs to (nt), by number of tets: 0 is the largest. size (at most *parts
 // entries of it, caller's array of nt) receives the tets of each. Tets hang together by vertices.
 ep_status ep_mesh_parts(const ep_mesh *mesh, int *part, int *size, int *parts, ep_error *err);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/forest.h"
 #include "linalg/dense.h"
 
 static ep_status no_memory(ep_error *err) {
@@ -12,15 +13,11 @@ static ep_status no_memory(ep_error *err) {
 
 // ---- parts outside -----------------------------------------------------------------------------
 
-static int root_of(int *parent, int v) {
-  while (parent[v] != v) v = parent[v] = parent[parent[v]];
-  return v;
-}
-
 // Vertices of weight 0 that share a tet are of one part, numbered by their first vertex.
 static void find_parts(ep_pose_limits *l, int *parent) {
   const ep_mesh *mesh = l->mesh;
-  for (int v = 0; v < mesh->nv; v++) parent[v] = v, l->part[v] = -1;
+  for (int v = 0; v < mesh->nv; v++) l->part[v] = -1;
+  ep_forest_start(parent, mesh->nv);
   for (int e = 0; e < mesh->nt; e++) {
     int first = -1;
     for (int i = 0; i < 4; i++) {
@@ -28,13 +25,13 @@ static void find_parts(ep_pose_limits *l, int *parent) {
       if (l->weight[v] > 0) continue;
       if (first < 0)
         first = v;
-      else if (root_of(parent, v) != root_of(parent, first))
-        parent[root_of(parent, v)] = root_of(parent, first);
+      else
+        ep_forest_join(parent, v, first);
     }
   }
   for (int v = 0; v < mesh->nv; v++) {
     if (l->weight[v] > 0) continue;
-    const int root = root_of(parent, v);
+    const int root = ep_forest_root(parent, v);
     if (l->part[root] < 0) l->part[root] = l->parts++;
     l->part[v] = l->part[root];
   }

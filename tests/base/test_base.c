@@ -17,6 +17,7 @@
 
 #include "base/error.h"
 #include "base/files.h"
+#include "base/forest.h"
 #include "base/random.h"
 
 static void first_error_is_kept(void **state) {
@@ -152,6 +153,27 @@ static void random_numbers_repeat_and_are_uniform(void **state) {
   for (int i = 0; i < 10; i++) assert_in_range(bins[i], COUNT / 10 - 475, COUNT / 10 + 475);
 }
 
+// Against the transitive closure of the pairs, by brute force.
+static void forests_hold_the_closure_of_their_pairs(void **state) {
+  (void)state;
+  enum { COUNT = 40, PAIRS = 60 };
+  ep_random rng = ep_random_seed(3, 1);
+  int parent[COUNT], group[COUNT], groups = COUNT;
+  ep_forest_start(parent, COUNT);
+  for (int i = 0; i < COUNT; i++) group[i] = i;
+  for (int pair = 0; pair < PAIRS; pair++) {
+    const int a = ep_random_below(&rng, COUNT), b = ep_random_below(&rng, COUNT);
+    const int low = group[a] < group[b] ? group[a] : group[b], high = group[a] + group[b] - low;
+    assert_int_equal(ep_forest_join(parent, a, b), low != high);
+    groups -= low != high;
+    for (int i = 0; i < COUNT; i++)
+      if (group[i] == high) group[i] = low;
+    // groups are named by their lowest member, as roots are
+    for (int i = 0; i < COUNT; i++) assert_int_equal(ep_forest_root(parent, i), group[i]);
+  }
+  assert_in_range(groups, 2, COUNT / 2); // not all one, and not trivially apart
+}
+
 static void hashes_tell_contents_apart(void **state) {
   (void)state;
   const ep_digest a = ep_hash_bytes("abc", 3), b = ep_hash_bytes("abd", 3);
@@ -173,6 +195,7 @@ int main(void) {
       cmocka_unit_test(folders_are_made_and_files_in_the_way_named),
       cmocka_unit_test(paths_come_apart_and_together),
       cmocka_unit_test(random_numbers_repeat_and_are_uniform),
+      cmocka_unit_test(forests_hold_the_closure_of_their_pairs),
       cmocka_unit_test(hashes_tell_contents_apart),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
