@@ -331,8 +331,40 @@ static void free_fine(fine_map *f) {
   ep_point_map_free(&f->back);
 }
 
+// Regions in use that the map agrees with, into use (regions): others would pull it farther with
+// every round.
+static ep_status agreeing_regions(const job *j, const int *p, unsigned char *use, ep_error *err) {
+  const int count = j->from.regions;
+  double *overlap = malloc((size_t)count * count * sizeof *overlap);
+  int *best = malloc((size_t)count * sizeof *best);
+  ep_status status = overlap && best
+                         ? ep_region_overlap(&j->from, &j->to, p, overlap, err)
+                         : ep_fail(err, EP_ERR_MEMORY, "no memory for %d regions", count);
+  if (status == EP_OK) ep_region_suspects(count, overlap, j->use, use, best);
+  for (int g = 0; g < count && status == EP_OK; g++) use[g] = j->use[g] && !use[g];
+  free(overlap);
+  free(best);
+  return status;
+}
+
+static ep_status refine_elastically(const job *j, const ep_trial *t, fine_map *out, ep_error *err) {
+  ep_match_rule rule = rule_of(j);
+  unsigned char *use = NULL;
+  ep_status status = EP_OK;
+  if (j->use) {
+    use = malloc((size_t)j->from.regions);
+    status = use ? agreeing_regions(j, t->p, use, err)
+                 : ep_fail(err, EP_ERR_MEMORY, "no memory for %d regions", j->from.regions);
+    rule.use = use;
+  }
+  if (status == EP_OK)
+    status = ep_elastic_refine(&j->from, &j->to, t->r, &rule, &out->there, &out->back,
+                               &out->elastic, err);
+  free(use);
+  return status;
+}
+
 static ep_status refine(const job *j, ep_trial *t, fine_map *out, ep_error *err) {
-  const ep_match_rule rule = rule_of(j);
   const ep_side *from = &j->from, *to = &j->to;
   EP_TRY(ep_point_map_make(from->n, &out->there, err));
   EP_TRY(ep_point_map_make(to->n, &out->back, err));
@@ -341,7 +373,7 @@ static ep_status refine(const job *j, ep_trial *t, fine_map *out, ep_error *err)
   memcpy(out->back.p, t->back, (size_t)to->n * sizeof *t->back);
   EP_TRY(ep_point_map_from_vertices(to->n, from->shape->mesh, &out->back, err));
   EP_TRY(ep_map_handedness(from, to, t->r, &out->there, &out->handed, err));
-  return ep_elastic_refine(from, to, t->r, &rule, &out->there, &out->back, &out->elastic, err);
+  return refine_elastically(j, t, out, err);
 }
 
 // The trial, or the other one where there is one and its refined map has the lower energy.

@@ -306,7 +306,7 @@ ep_status ep_match_positions(const ep_side *from, const ep_side *to, const doubl
   matcher w;
   bare_from.marks = bare_to.marks = 0;
   bare_from.splines = bare_to.splines = false;
-  bare.mark_weight = bare.region_weight = 0;
+  bare.mark_weight = 0;
   EP_TRY(make_matcher(&bare_from, &bare_to, r, &bare, &w, err));
   memcpy(w.smooth, y, 3 * (size_t)from->n * sizeof *y);
   ep_status status = match_layer(&w, true, map, err);

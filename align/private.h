@@ -133,8 +133,8 @@ ep_status ep_match_plain(const ep_side *from, const ep_side *to, const double r[
 ep_status ep_match_functional(const ep_side *from, const ep_side *to, const int *p, double *c,
                               ep_error *err);
 // The points of `to` nearest to y (from->n x 3, in from's frame), those of the boundary on the
-// boundary: map (p in: where the search starts). Functions, landmarks and regions take no part:
-// regions in wrong order would pull farther with every round.
+// boundary, those of a region in it: map (p in: where the search starts). Functions and landmarks
+// take no part.
 ep_status ep_match_positions(const ep_side *from, const ep_side *to, const double r[9],
                              const ep_match_rule *rule, const double *y, ep_point_map *map,
                              ep_error *err);
