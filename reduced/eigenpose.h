@@ -213,7 +213,7 @@ typedef struct ep_step_def {
   double dt;                // [s]
   const double *force;      // (r) generalised external force U^T f, or NULL; of a free object:
   // forces that turn with it
-  double gravity[3];        // [m/s^2] free objects; of a held one it is in `force`
+  double gravity[3];        // [m/s^2] on everything: all of its weight, beside `force`
   int pulls;                // forces fixed in the world, free objects only
   const ep_pull *pull;      // (pulls)
   ep_outer_potential outer; // a potential of the world acting on the object, or NULL
@@ -269,8 +269,8 @@ typedef struct ep_step_report {
 // fine: the two-step formula and the acceleration then start anew. report may be NULL.
 // A free object moves as a whole too: gravity, pulls and outer potentials change its momenta,
 // nothing else does (but damping_mass, a drag against the still world). The state's frame moves
-// with them. Errors: EP_ERR_ARGUMENT (def, or gravity and pulls of a held object), EP_ERR_NUMERIC
-// (no convergence, NaN): the state is unchanged.
+// with them. Errors: EP_ERR_ARGUMENT (def, or pulls of a held object), EP_ERR_NUMERIC (no
+// convergence, NaN): the state is unchanged.
 ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *report);
 
 // The example force of a step with the target of the last interpolation (ep_interpolate, ep_step)

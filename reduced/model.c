@@ -7,7 +7,7 @@
 #include "reduced/tensorfile.h"
 #include "reduced/text.h"
 
-enum { SCHEMA = 2, MAX_MODES = 4096, MAX_EXAMPLES = 1024 };
+enum { SCHEMA = 3, MAX_MODES = 4096, MAX_EXAMPLES = 1024 };
 
 // ---- metadata ----------------------------------------------------------------------------------
 
@@ -47,7 +47,7 @@ static ep_status read_kind(const ep_tensorfile *file, char *message) {
   if (schema != SCHEMA) {
     ep_text_set(message, "model schema ");
     ep_text_add_number(message, schema);
-    ep_text_add(message, "; this version reads schema 2: bake the scene again, or update");
+    ep_text_add(message, "; this version reads schema 3: bake the scene again, or update");
     return EP_ERR_FORMAT;
   }
   if ((status = read_text(file, "real", text, message)) != EP_OK) return status;

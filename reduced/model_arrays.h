@@ -91,6 +91,8 @@
   X(double, rigid_s1,      rigid, 6, r)                                                           \
   X(double, rigid_s2,      rigid, 6, r * (r + 1) / 2)                                             \
   X(double, rigid_h,       rigid, 3, r * (r + 1) / 2)                  \
+  /* a held object under gravity: sum m U_a, so that the force is its product with gravity [mass] */ \
+  X(double, gravity_modes, rigid ? 0 : 3, r, 1)                                                   \
   /* contact (reduced/contact.h), vertices in the tree's order: number in the mesh, position at */ \
   /* rest, area, rows of U; per node: first vertex, end, next node when passed over; ball at */   \
   /* rest, its centre's rows of U, growth of its radius by each |q_k|; Young's modulus over the */ \

@@ -47,6 +47,7 @@
   X(end_v, r)                                                                                     \
   X(next_w, sets + k)         /* interpolation under way: kept only when the step succeeds */        \
   X(next_target, sets * r)                                                                               \
+  X(load, free ? 0 : r)       /* force and gravity of a held object */                            \
   X(work, r)                                                                                      \
   X(set_w, regions ? sets + k : 0)     /* regions: weights of one set; the material's elements */  \
   X(kept_weight, regions ? s : 0)      /* less what relief leaves out */                          \

@@ -311,11 +311,23 @@ static void set_report(const ep_step_run *s, const ep_newton *newton, ep_step_re
   report->green_energy = s->strains;
 }
 
-// Gravity and pulls of a held object are in its `force`.
+// Pulls of a held object are in its `force`.
 static int suits_model(const ep_model *m, const ep_step_def *def) {
-  const double *g = def->gravity;
-  return suits_regions(m, def) &&
-         (m->size.rigid || (def->pulls == 0 && g[0] == 0 && g[1] == 0 && g[2] == 0));
+  return suits_regions(m, def) && (m->size.rigid || def->pulls == 0);
+}
+
+// The definition with a held object's gravity in its force: a free one's moves its frame instead.
+static ep_step_def load_held(ep_state *state, const ep_step_def *given) {
+  const ep_model *m = state->model;
+  const double *g = given->gravity;
+  ep_step_def def = *given;
+  if (m->size.rigid || (g[0] == 0 && g[1] == 0 && g[2] == 0)) return def;
+  for (int a = 0; a < m->size.r; a++) {
+    state->load[a] = given->force ? given->force[a] : 0;
+    for (int i = 0; i < 3; i++) state->load[a] += g[i] * m->gravity_modes[i * m->size.r + a];
+  }
+  def.force = state->load;
+  return def;
 }
 
 static ep_status find_target(ep_step_run *s, ep_step_report *report) {
@@ -326,12 +338,13 @@ static ep_status find_target(ep_step_run *s, ep_step_report *report) {
   return status;
 }
 
-ep_status ep_step(ep_state *state, const ep_step_def *def, ep_step_report *report) {
+ep_status ep_step(ep_state *state, const ep_step_def *given, ep_step_report *report) {
   ep_step_report unused;
   const ep_model_sizes *size = &state->model->size;
   if (!report) report = &unused;
   *report = (ep_step_report){0};
-  if (!ep_step_def_valid(def) || !suits_model(state->model, def)) return EP_ERR_ARGUMENT;
+  if (!ep_step_def_valid(given) || !suits_model(state->model, given)) return EP_ERR_ARGUMENT;
+  const ep_step_def loaded = load_held(state, given), *def = &loaded;
   // Without m only the examples' strains are known.
   ep_step_run s = {.state = state,
                    .def = def,

@@ -47,7 +47,6 @@ ep_status ep_free_loads_make(const ep_scene *scene, const ep_shapes *shapes, con
   if (status == EP_OK) ep_shapes_vertex_mass(shapes, mass);
   for (int i = 0; i < scene->nloads && status == EP_OK; i++) {
     const ep_load *load = &scene->load[i];
-    for (int a = 0; load->gravity && a < 3; a++) out->gravity[a] += load->vector[a];
     if (load->gravity) continue;
     ep_pull *pull = &out->pull[out->pulls];
     double *modes = out->modes + 3 * r * (size_t)out->pulls++;
@@ -75,5 +74,4 @@ void ep_free_loads_set(const ep_scene *scene, ep_free_loads *loads, double t, bo
   }
   def->pull = loads->pull;
   def->pulls = loads->pulls;
-  for (int a = 0; a < 3; a++) def->gravity[a] = act ? loads->gravity[a] : 0;
 }

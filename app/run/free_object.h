@@ -9,10 +9,9 @@
 ep_status ep_free_start(const ep_scene *scene, ep_state *state, ep_error *err);
 
 typedef struct ep_free_loads {
-  int pulls;
+  int pulls; // all loads but gravity, which acts on held objects too (stepper.c)
   ep_pull *pull;     // (pulls) of the step at hand
-  double *modes;     // (scene's loads x r x 3)
-  double gravity[3]; // sum of all
+  double *modes; // (scene's loads x r x 3)
 } ep_free_loads;
 // Means of positions and modes over what each push acts on. Errors: those of selections.
 ep_status ep_free_loads_make(const ep_scene *scene, const ep_shapes *shapes, const ep_model *model,

@@ -26,7 +26,8 @@ struct ep_stepper {
   ep_step_def def;
   ep_nlopt_target *nlopt; // NULL: Newton
   timed_solver solver;
-  double *load;            // (nloads x r) generalised force at full strength
+  double gravity[3]; // of all the scene's loads
+  double *load;      // (nloads x r) generalised force at full strength; of gravity 0: def has it
   double *region_strength; // (regions) of a model with regions; NULL
   double *force;           // (r) of the step at hand
   ep_free_loads free;      // loads of a free object, instead of `load` and `force`
@@ -47,6 +48,8 @@ static ep_status timed_solve(void *user, ep_state *state, const double *w, doubl
 
 static ep_status make_loads(ep_stepper *s, const ep_shapes *shapes, ep_error *err) {
   const size_t r = (size_t)s->model->size.r, count = (size_t)s->scene->nloads;
+  for (size_t i = 0; i < 3 * count; i++)
+    if (s->scene->load[i / 3].gravity) s->gravity[i % 3] += s->scene->load[i / 3].vector[i % 3];
   if (s->model->size.rigid) return ep_free_loads_make(s->scene, shapes, s->model, &s->free, err);
   double *mass = malloc((size_t)s->model->size.n * sizeof *mass);
   s->load = calloc(count * r + 1, sizeof *s->load);
@@ -56,7 +59,8 @@ static ep_status make_loads(ep_stepper *s, const ep_shapes *shapes, ep_error *er
     status = ep_fail(err, EP_ERR_MEMORY, "no memory for the loads");
   if (status == EP_OK) ep_shapes_vertex_mass(shapes, mass);
   for (size_t i = 0; i < count && status == EP_OK; i++)
-    status = ep_load_project(&s->scene->load[i], shapes, s->model, mass, s->load + i * r, err);
+    if (!s->scene->load[i].gravity)
+      status = ep_load_project(&s->scene->load[i], shapes, s->model, mass, s->load + i * r, err);
   free(mass);
   return status;
 }
@@ -64,6 +68,7 @@ static ep_status make_loads(ep_stepper *s, const ep_shapes *shapes, ep_error *er
 static void set_force(ep_stepper *s, double t, bool loads) {
   const int r = s->model->size.r;
   if (s->force) memset(s->force, 0, (size_t)r * sizeof *s->force);
+  for (int i = 0; i < 3; i++) s->def.gravity[i] = loads ? s->gravity[i] : 0;
   if (loads) ep_pressures_add(s->scene, &s->pressures, t, ep_state_q(s->state), s->force);
   if (s->model->size.rigid) {
     ep_free_loads_set(s->scene, &s->free, t, loads, &s->def);

@@ -40,7 +40,7 @@ typedef struct ep_full_report {
 } ep_full_report;
 
 // One step. def as for ep_step, but def->force is the nodal force (3n) [N] at the end of the step
-// (NULL: none); report may be NULL.
+// (NULL: none), gravity included: def->gravity is not read; report may be NULL.
 // Errors: EP_ERR_ARGUMENT (def), EP_ERR_NUMERIC (no convergence): the motion is unchanged.
 ep_status ep_full_step(ep_full *full, const ep_step_def *def, ep_full_report *report,
                        ep_error *err);

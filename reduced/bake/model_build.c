@@ -352,6 +352,21 @@ static ep_status fill_inertia(builder *b, ep_error *err) {
   return status;
 }
 
+// sum_v m_v U_a(v), m_v the rows' sums of the mass.
+static ep_status fill_gravity(builder *b, ep_error *err) {
+  const size_t n = (size_t)b->size.n, r = (size_t)b->size.r;
+  ep_csr mass = {0};
+  EP_TRY(ep_fem_scalar_mass(b->parts->fem, &mass, err));
+  double *work = malloc(2 * n * sizeof *work), *weight = work + n;
+  for (size_t v = 0; work && v < n; v++) work[v] = 1;
+  if (work) ep_csr_multiply(&mass, 1, work, weight);
+  for (size_t i = 0; work && i < 3 * n * r; i++)
+    b->a.gravity_modes[i % 3 * r + i / (3 * n)] += weight[i % (3 * n) / 3] * b->a.u[i];
+  free(work);
+  ep_csr_free(&mass);
+  return work ? EP_OK : ep_fail(err, EP_ERR_MEMORY, "no memory for gravity");
+}
+
 static int cubic_size(const ep_model_parts *p, ep_precision precision) {
   return p->cubic && p->precision == precision ? (int)ep_cubic_stream_size(p->basis->r, precision)
                                                : 0;
@@ -393,7 +408,7 @@ ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_e
   EP_TRY_GOTO(status, build_guards(&b, err), fail);
   fill_green(&b);
   fill_contact(&b);
-  if (b.size.rigid) EP_TRY_GOTO(status, fill_inertia(&b, err), fail);
+  EP_TRY_GOTO(status, b.size.rigid ? fill_inertia(&b, err) : fill_gravity(&b, err), fail);
   if (parts->cubic) EP_TRY_GOTO(status, fill_cubic(&b, err), fail);
   out->model.size = b.size;
   out->model.material = parts->fem->model;

@@ -222,7 +222,7 @@ ep_status ep_model_write(const char *path, const ep_model *model, int nmeta,
   int used = 0, at = 0;
   EP_TRY(check_model(path, model, err));
   all[used++] = (ep_metadata){"format", "eigenpose-model"};
-  all[used++] = (ep_metadata){"schema", "2"};
+  all[used++] = (ep_metadata){"schema", "3"};
   all[used++] = (ep_metadata){"real", "f64"};
   all[used++] = (ep_metadata){"units", "SI"};
   all[used++] = (ep_metadata){"material", ep_material_name(model->material)};

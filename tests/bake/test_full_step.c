@@ -6,6 +6,8 @@
 //  - errors fall with dt as order 1 (implicit Euler), 2 (Newmark), 2 (BDF2), full and reduced;
 //  - implicit Euler never adds energy: E(n+1) <= E(n) without load;
 //  - a body that nothing holds keeps its linear momentum, sum m v;
+//  - gravity by the model alone is the force of the vertices' lumped masses, to round-off, and sags
+//    as in the full space; it adds to def.force;
 //  - a failed step leaves the motion as it was.
 #include "reduced/bake/full_step.h"
 
@@ -366,6 +368,55 @@ static void free_body_keeps_momentum(void **state) {
   }
 }
 
+// Weight of the lumped masses, as the loads of a scene have it.
+static void weight_of(const bar *b, const double g[3], double *f) {
+  for (int e = 0; e < b->mesh.nt; e++)
+    for (int i = 0; i < 12; i++)
+      f[3 * b->mesh.tet[4 * e + i / 3] + i % 3] +=
+          0.25 * b->fem.volume[e] * SOFT.density * g[i % 3];
+}
+
+// Steps until it hangs still; damping by mass and long steps. The reduced object under gravity and
+// another force, the reference with both in its force.
+static void gravity_of_a_held_object(void **state) {
+  (void)state;
+  static const double g[3] = {2, -9.81, 1};
+  complete c;
+  ep_full *full;
+  make_complete(&c, EP_STABLE_NEOHOOKEAN, 0);
+  const size_t n3 = c.b.n3, r = (size_t)c.basis.r;
+  const double *modes = c.whole.memory.model.gravity_modes;
+  double *f = vector_of(n3), *fr = vector_of(r), *other = vector_of(n3), *other_r = vector_of(r);
+  weight_of(&c.b, g, f);
+  reduce(&c, f, fr);
+  for (size_t a = 0; a < r; a++) {
+    const double by_model = g[0] * modes[a] + g[1] * modes[r + a] + g[2] * modes[2 * r + a];
+    ASSERT_LESS(fabs(by_model - fr[a]), 1e-13 * norm_of(r, fr));
+  }
+  load_at(&c.b, 0.2, other);
+  reduce(&c, other, other_r);
+  for (size_t i = 0; i < n3; i++) f[i] += other[i];
+  ASSERT_OK(ep_full_create(&c.b.fem, NULL, NULL, &full, err));
+  ep_step_def def = exact_step(EP_IMPLICIT_EULER, 1), whole = def;
+  def.force = other_r, whole.force = f;
+  memcpy(def.gravity, g, sizeof def.gravity);
+  for (int i = 0; i < 30; i++) {
+    assert_int_equal(ep_step(c.state, &def, NULL), EP_OK);
+    ASSERT_OK(ep_full_step(full, &whole, NULL, err));
+  }
+  double *sag = ep_full_displacement(full), apart = 0;
+  for (size_t i = 0; i < n3; i++)
+    apart = fmax(apart, fabs(nodal_of(&c.basis, ep_state_q(c.state), i) - sag[i]));
+  ASSERT_LESS(0.01, norm_of(n3, sag)); // it does hang: a per cent of its length
+  ASSERT_LESS(norm_of(n3, ep_full_velocity(full)), 1e-6);
+  ASSERT_LESS(apart, 1e-9 * norm_of(n3, sag)); // two Newtons to 1e-12
+  def.gravity[1] = NAN;
+  assert_int_equal(ep_step(c.state, &def, NULL), EP_ERR_ARGUMENT);
+  ep_full_free(full);
+  free(f), free(fr), free(other), free(other_r);
+  free_complete(&c);
+}
+
 static void failure_changes_nothing(void **state) {
   (void)state;
   bar b;
@@ -405,6 +456,7 @@ int main(void) {
       cmocka_unit_test(reduced_orders_in_time),
       cmocka_unit_test(euler_never_adds_energy),
       cmocka_unit_test(free_body_keeps_momentum),
+      cmocka_unit_test(gravity_of_a_held_object),
       cmocka_unit_test(failure_changes_nothing),
   };
   return cmocka_run_group_tests(tests, session_start, session_stop);

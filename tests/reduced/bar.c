@@ -96,6 +96,13 @@ static double *make_modes(bar *b, const double *x, const double *mass) {
   return u;
 }
 
+static double *make_gravity(bar *b, const double *mass) {
+  const size_t n3 = 3 * (size_t)b->model.size.n, r = (size_t)b->model.size.r;
+  double *modes = own(b, sizeof *modes * 3 * r);
+  for (size_t i = 0; i < n3 * r; i++) modes[i % 3 * r + i / n3] += mass[i % n3 / 3] * b->model.u[i];
+  return modes;
+}
+
 static void make_gradients(bar *b) {
   const int n = b->model.size.n, r = b->model.size.r;
   b->g = own(b, sizeof *b->g * 9 * (size_t)b->model.size.nt * (size_t)r);
@@ -314,6 +321,7 @@ bar *bar_create(int nx, int ny, int nz, int r, int s, int m, int k, ep_material 
     for (int i = 0; i < 4; i++) mass[tets[4 * t + i]] += density * b->volume[t] / 4;
   }
   b->model.u = make_modes(b, x, mass);
+  b->model.gravity_modes = make_gravity(b, mass);
   make_gradients(b);
   b->model.k0 = make_k0(b, lambda, mu);
   make_cubature(b, s == 0, lambda, mu);

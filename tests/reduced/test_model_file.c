@@ -139,8 +139,8 @@ static void damaged_headers_are_refused(void **state) {
   (void)state;
   static const char *const edits[][3] = {
       {"eigenpose-model", "something-other", "not an Eigenpose model"},
-      {"\"schema\":\"2\"", "\"schema\":\"1\"", "schema 1"},
-      {"\"schema\":\"2\"", "\"schema\":\"3\"", "schema 3"},
+      {"\"schema\":\"3\"", "\"schema\":\"2\"", "schema 2; this version reads schema 3: bake"},
+      {"\"schema\":\"3\"", "\"schema\":\"4\"", "schema 4"},
       {"\"real\":\"f64\"", "\"real\":\"f32\"", "f64"},
       {"neohookean", "neohookeax", "unknown material"},
       {"\"format\"", "\"fromat\"", "lacks \"format\""},
