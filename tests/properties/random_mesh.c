@@ -263,8 +263,12 @@ ep_mesh solid_mesh(const random_solid *s) {
   return mesh;
 }
 
+double solid_length(const random_solid *s) {
+  return s->arc == 0 ? s->size[0] : s->size[0] / s->arc * sin(fmin(s->arc, 1.57));
+}
+
 void pose_points(const random_solid *s, const random_pose *pose, int n, double *x) {
-  const double length = s->arc == 0 ? s->size[0] : s->size[0] / s->arc * sin(fmin(s->arc, 1.57));
+  const double length = solid_length(s);
   for (int v = 0; v < n; v++) {
     double *p = x + 3 * v;
     const double t = fmax(0, p[0] / length - 0.15), angle = pose->twist * t;

@@ -32,6 +32,9 @@ const char *solid_name(solid_shape shape);
 // The same solid in another lattice, about `finer` times as fine.
 random_solid other_lattice(const random_solid *solid, double finer, uint64_t seed);
 
+// How far it reaches along x.
+double solid_length(const random_solid *solid);
+
 // Lattice order, no tet turned round. Fails the test where memory ends.
 ep_mesh solid_mesh(const random_solid *solid);
 

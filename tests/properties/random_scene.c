@@ -242,13 +242,9 @@ static void end(writer *w, char closing) {
   if (w->within) fprintf(w->file, "%c\n", closing);
 }
 
-static double length_of(const random_solid *s) {
-  return s->arc == 0 ? s->size[0] : s->size[0] / s->arc * sin(fmin(s->arc, 1.57));
-}
-
 // What lies beyond a share of the length from what is held.
 static void write_plane(const writer *w, double share, char *text, size_t size) {
-  const double point[3] = {share * length_of(&w->s->object), 0, 0}, normal[3] = {-1, 0, 0};
+  const double point[3] = {share * solid_length(&w->s->object), 0, 0}, normal[3] = {-1, 0, 0};
   snprintf(text, size, "plane: {point: %s, normal: %s}", at_point(w, point).text,
            along(w, normal, 1).text);
 }
@@ -315,7 +311,7 @@ static void save_held(const char *folder, const ep_mesh *home, const int *to, do
   fclose(f);
 }
 
-static const double held_share = 0.12, tip_share = 0.8;
+static const double held_share = 0.12;
 
 static void save_object(const random_scene *s, const placement *at, const char *folder, int *to) {
   ep_mesh home = solid_mesh(&s->object);
@@ -325,7 +321,7 @@ static void save_object(const random_scene *s, const placement *at, const char *
   double *paint = calloc(nv, sizeof *paint);
   assert_true(numbers_of && paint);
   ep_mesh placed = placed_mesh(&home, at, 0, numbers_of, NULL);
-  const double until = held_share * length_of(&s->object);
+  const double until = held_share * solid_length(&s->object);
   for (size_t v = 0; v < nv; v++) paint[numbers_of[v]] = home.x[3 * v] <= until;
   const ep_field field = {"paint", 1, paint};
   save(folder, "object", &placed, s->held_by == BY_FIELD ? &field : NULL);
@@ -365,7 +361,7 @@ static void write_object(writer *w) {
 }
 
 static void write_fixed(writer *w) {
-  const double point[3] = {held_share * length_of(&w->s->object), 0, 0}, normal[3] = {1, 0, 0};
+  const double point[3] = {held_share * solid_length(&w->s->object), 0, 0}, normal[3] = {1, 0, 0};
   section(w, "fixed");
   if (!w->s->held) return;
   if (w->s->held_by == BY_FILE) fprintf(w->file, "fixed: [{file: held.txt}]\n");
@@ -383,7 +379,7 @@ static void write_landmarks(const writer *w, const random_family *f, char *text,
   for (int i = 0; i < 4; i++) {
     double x[3];
     for (int k = 0; k < 3; k++)
-      x[k] = ends[i][k] * (k ? w->s->object.size[k] : length_of(&w->s->object));
+      x[k] = ends[i][k] * (k ? w->s->object.size[k] : solid_length(&w->s->object));
     used += (size_t)snprintf(text + used, size - used, "%s{object_at: %s, rest_at: %s}",
                              i ? ", " : "", at_point(w, x).text, at_point(&other, x).text);
   }
@@ -452,10 +448,10 @@ static void write_examples(writer *w) {
 }
 
 static void write_load(writer *w, const random_load *l) {
-  const double u = w->at->unit, tip[3] = {length_of(&w->s->object), 0, 0};
+  const double u = w->at->unit, tip[3] = {solid_length(&w->s->object), 0, 0};
   char plane[240];
   double to[3];
-  write_plane(w, tip_share, plane, sizeof plane);
+  write_plane(w, TIP_SHARE, plane, sizeof plane);
   for (int i = 0; i < 3; i++) to[i] = tip[i] + l->vector[i];
   switch (l->kind) {
   case LOAD_GRAVITY:

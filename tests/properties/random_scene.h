@@ -9,6 +9,9 @@
 #include "reduced/eigenpose.h"
 #include "tests/properties/random_mesh.h"
 
+// What loads act on lies beyond this share of the length; no plane of vertices lies just there.
+#define TIP_SHARE 0.81
+
 enum { POSES_MOST = 2, FAMILIES_MOST = 2, LOADS_MOST = 3, OBSTACLES_MOST = 2 };
 
 typedef enum selection_kind { BY_PLANE, BY_FILE, BY_FIELD } selection_kind;
