@@ -6,15 +6,17 @@
 
 #include "mesh/topology.h"
 
-static double longest_edge(const double *x, const int *v) {
+bool ep_tet_degenerate(const double *x, const int *v, double volume) {
   double longest = 0;
   for (int i = 0; i < 4; i++)
     for (int j = 0; j < i; j++) {
-      const double *a = x + 3 * v[i], *b = x + 3 * v[j];
+      const double *a = x + 3 * (size_t)v[i], *b = x + 3 * (size_t)v[j];
       const double d = hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+      if (v[i] == v[j]) return true;
       if (d > longest) longest = d;
     }
-  return longest;
+  // Negated so that volumes lost to underflow count as degenerate.
+  return !(fabs(volume) > EP_DEGENERATE_VOLUME * longest * longest * longest);
 }
 
 static void swap_int(int *a, int *b) {
@@ -29,9 +31,7 @@ static ep_status check_tets(ep_mesh *mesh, ep_mesh_findings *f, ep_error *err) {
   ep_tet_volumes(mesh, mesh->x, volume);
   for (int e = 0; e < mesh->nt; e++) {
     int *v = mesh->tet + 4 * e;
-    const double edge = longest_edge(mesh->x, v);
-    // Negated so that volumes lost to underflow count as degenerate.
-    const bool degenerate = !(fabs(volume[e]) > EP_DEGENERATE_VOLUME * edge * edge * edge);
+    const bool degenerate = ep_tet_degenerate(mesh->x, v, volume[e]);
     if (degenerate && f->degenerate_tets++ == 0) f->first_degenerate = e;
     if (!(volume[e] < 0)) continue;
     swap_int(v + 2, v + 3);

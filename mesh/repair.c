@@ -66,15 +66,9 @@ ep_status ep_mesh_same_places(const ep_mesh *mesh, int *first, int *count, ep_er
 // ---- repair ------------------------------------------------------------------------------------
 
 static bool degenerate(const ep_mesh *mesh, const int *v) {
-  double edge = 0, g[12];
-  for (int i = 0; i < 4; i++)
-    for (int j = 0; j < i; j++) {
-      const double *a = mesh->x + 3 * (size_t)v[i], *b = mesh->x + 3 * (size_t)v[j];
-      edge = fmax(edge, hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]));
-      if (v[i] == v[j]) return true;
-    }
+  double g[12];
   const ep_mesh one = {.nt = 1, .x = mesh->x, .tet = (int *)v};
-  return !(fabs(ep_tet_gradients(&one, 0, g)) > EP_DEGENERATE_VOLUME * edge * edge * edge);
+  return ep_tet_degenerate(mesh->x, v, ep_tet_gradients(&one, 0, g));
 }
 
 static bool copy_double(const double *from, size_t count, double **to) {

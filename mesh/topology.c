@@ -1,54 +1,22 @@
 #include "mesh/topology.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 #include "base/forest.h"
+#include "mesh/faces.h"
 
 // ---- faces -------------------------------------------------------------------------------------
 
-typedef struct face {
-  int v[3]; // ascending
-  int tet;
-  bool even; // the tet sees them as an even permutation, outward
-} face;
-
-static const int outward[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-
-static face make_face(const int *tet, int e, int which) {
-  face f = {.tet = e, .even = true};
-  for (int i = 0; i < 3; i++) {
-    const int v = tet[outward[which][i]];
-    int j = i;
-    for (; j > 0 && f.v[j - 1] > v; j--) {
-      f.v[j] = f.v[j - 1];
-      f.even = !f.even;
-    }
-    f.v[j] = v;
-  }
-  return f;
+static void note_overlap(ep_mesh_topology *out, const ep_face *f) {
+  const int tet = f[0].id / 4;
+  if (out->overlapping_faces++ && tet >= out->overlap_first) return;
+  out->overlap_first = tet;
+  out->overlap_second = f[1].id / 4;
 }
 
-static int compare_faces(const void *a, const void *b) {
-  const face *s = a, *t = b;
-  for (int i = 0; i < 3; i++)
-    if (s->v[i] != t->v[i]) return s->v[i] < t->v[i] ? -1 : 1;
-  return (s->tet > t->tet) - (s->tet < t->tet);
-}
-
-static bool same_face(const face *a, const face *b) {
-  return memcmp(a->v, b->v, sizeof a->v) == 0;
-}
-
-static void note_overlap(ep_mesh_topology *out, const face *f) {
-  if (out->overlapping_faces++ && f[0].tet >= out->overlap_first) return;
-  out->overlap_first = f[0].tet;
-  out->overlap_second = f[1].tet;
-}
-
-static void find_overlaps(const face *f, int count, ep_mesh_topology *out) {
+static void find_overlaps(const ep_face *f, int count, ep_mesh_topology *out) {
   for (int i = 0, n; i < count; i += n) {
-    for (n = 1; i + n < count && same_face(f + i, f + i + n);) n++;
+    n = ep_faces_alike(f, count, i);
     if (n > 2 || (n == 2 && f[i].even == f[i + 1].even)) note_overlap(out, f + i);
   }
 }
@@ -127,10 +95,8 @@ static ep_status examine_surface(const ep_mesh *mesh, ep_mesh_topology *out, ep_
 ep_status ep_mesh_examine(const ep_mesh *mesh, ep_mesh_topology *out, ep_error *err) {
   *out = (ep_mesh_topology){
       .overlap_first = -1, .overlap_second = -1, .open_edge = {-1, -1}, .first_pinched = -1};
-  face *f = malloc(4 * (size_t)mesh->nt * sizeof *f);
+  ep_face *f = ep_mesh_faces(mesh);
   if (!f) return ep_fail(err, EP_ERR_MEMORY, "no memory to check the faces of %s", mesh->name);
-  for (int i = 0; i < 4 * mesh->nt; i++) f[i] = make_face(mesh->tet + 4 * (i / 4), i / 4, i % 4);
-  qsort(f, 4 * (size_t)mesh->nt, sizeof *f, compare_faces);
   find_overlaps(f, 4 * mesh->nt, out);
   free(f);
   return examine_surface(mesh, out, err);

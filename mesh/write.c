@@ -3,6 +3,7 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "base/escape.h"
 #include "base/files.h"
 #include "mesh/io.h"
 #include "mesh/scan.h"
@@ -81,21 +82,10 @@ typedef struct vtu {
   const ep_field *point, *cell;
 } vtu;
 
-static void write_escaped(FILE *file, const char *text) {
-  for (const char *p = text; *p; p++) {
-    const char *special = strchr("&<>\"'", *p);
-    static const char *const entity[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&apos;"};
-    if (special)
-      fputs(entity[special - "&<>\"'"], file);
-    else
-      fputc(*p, file);
-  }
-}
-
 static void declare(FILE *file, const char *type, const char *name, int components, uint64_t bytes,
                     uint64_t *offset) {
   fprintf(file, "        <DataArray type=\"%s\" Name=\"", type);
-  write_escaped(file, name);
+  ep_write_escaped(file, name);
   fprintf(file, "\" NumberOfComponents=\"%d\" format=\"appended\" offset=\"%" PRIu64 "\"/>\n",
           components, *offset);
   *offset += sizeof(uint64_t) + bytes;
@@ -209,7 +199,7 @@ static ep_status write_pvd(FILE *file, const void *what, ep_error *err) {
                 "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n  <Collection>\n");
   for (int i = 0; i < w->count; i++) {
     fprintf(file, "    <DataSet timestep=\"%.12g\" group=\"\" part=\"0\" file=\"", w->time[i]);
-    write_escaped(file, w->files[i]);
+    ep_write_escaped(file, w->files[i]);
     fprintf(file, "\"/>\n");
   }
   fprintf(file, "  </Collection>\n</VTKFile>\n");

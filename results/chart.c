@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/escape.h"
 #include "base/files.h"
 #include "results/image.h"
 #include "results/plot.h"
@@ -83,20 +84,6 @@ static void put_mark(canvas *c, double x, double y, int shape, int color) {
     const int a = strokes[shape][i], b = strokes[shape][i + 1];
     put_line(c, x + size * (a % 3 - 1), y + size * (a / 3 - 1), x + size * (b % 3 - 1),
              y + size * (b / 3 - 1), 2.2, color);
-  }
-}
-
-void ep_write_escaped(FILE *out, const char *text) {
-  for (; *text; text++) {
-    const char *entity = *text == '&'   ? "&amp;"
-                         : *text == '<' ? "&lt;"
-                         : *text == '>' ? "&gt;"
-                         : *text == '"' ? "&quot;"
-                                        : NULL;
-    if (entity)
-      fputs(entity, out);
-    else
-      fputc(*text, out);
   }
 }
 

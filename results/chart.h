@@ -32,7 +32,4 @@ ep_status ep_chart_write_svg(const char *path, const ep_chart *chart, ep_error *
 // Twice the chart's size in pixels.
 ep_status ep_chart_write_png(const char *path, const ep_chart *chart, ep_error *err);
 
-// text with &, <, > and quotes escaped.
-void ep_write_escaped(FILE *out, const char *text);
-
 #endif

@@ -5,6 +5,7 @@
 
 #include "app/compare/compare_charts.h"
 #include "app/report.h"
+#include "base/escape.h"
 
 // ---- tables ------------------------------------------------------------------------------------
 

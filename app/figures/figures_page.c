@@ -4,8 +4,8 @@
 
 #include "app/figures/figures.h"
 #include "app/report.h"
+#include "base/escape.h"
 #include "base/files.h"
-#include "results/chart.h"
 
 static const char STYLE[] =
     "body{font:15px/1.5 system-ui,sans-serif;color:#1d2430;background:#fff;max-width:1400px;"

@@ -5,7 +5,7 @@
 
 #include "app/report.h"
 #include "app/stress/stress.h"
-#include "results/chart.h"
+#include "base/escape.h"
 
 // ---- sums over an axis -------------------------------------------------------------------------
 

@@ -16,6 +16,7 @@
 #include <cmocka.h>
 
 #include "base/error.h"
+#include "base/escape.h"
 #include "base/files.h"
 #include "base/forest.h"
 #include "base/random.h"
@@ -174,6 +175,19 @@ static void forests_hold_the_closure_of_their_pairs(void **state) {
   assert_in_range(groups, 2, COUNT / 2); // not all one, and not trivially apart
 }
 
+static void texts_are_fit_for_attributes(void **state) {
+  (void)state;
+  char *text;
+  size_t size;
+  ep_output out;
+  assert_int_equal(ep_output_open(&out, "escaped.txt", NULL), EP_OK);
+  ep_write_escaped(out.file, "<a b=\"c\"> & 'd', \xc3\xa9");
+  assert_int_equal(ep_output_commit(&out, NULL), EP_OK);
+  assert_int_equal(ep_file_read("escaped.txt", &text, &size, NULL), EP_OK);
+  assert_string_equal(text, "&lt;a b=&quot;c&quot;&gt; &amp; &apos;d&apos;, \xc3\xa9");
+  free(text);
+}
+
 static void hashes_tell_contents_apart(void **state) {
   (void)state;
   const ep_digest a = ep_hash_bytes("abc", 3), b = ep_hash_bytes("abd", 3);
@@ -196,6 +210,7 @@ int main(void) {
       cmocka_unit_test(paths_come_apart_and_together),
       cmocka_unit_test(random_numbers_repeat_and_are_uniform),
       cmocka_unit_test(forests_hold_the_closure_of_their_pairs),
+      cmocka_unit_test(texts_are_fit_for_attributes),
       cmocka_unit_test(hashes_tell_contents_apart),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
