@@ -8,7 +8,6 @@
 #include "base/escape.h"
 #include "base/files.h"
 #include "results/image.h"
-#include "results/plot.h"
 
 // sRGB; 0 ink, 1 grid, from 2 on the series: told apart also without colour, by their marks.
 static const unsigned char palette[10][3] = {
@@ -89,6 +88,21 @@ static void put_mark(canvas *c, double x, double y, int shape, int color) {
 
 // ---- axes --------------------------------------------------------------------------------------
 
+void ep_chart_ticks(double low, double high, int wanted, double *first, double *step, int *count) {
+  if (!(high > low)) { // one value: room around it
+    const double room = low != 0 ? 0.5 * fabs(low) : 1;
+    low -= room;
+    high += room;
+  }
+  const double rough = (high - low) / wanted, ten = pow(10, floor(log10(rough)));
+  const double digit = rough / ten;
+  *step = ten * (digit <= 1 ? 1 : digit <= 2 ? 2 : digit <= 5 ? 5 : 10);
+  // A time of 60 steps of 0.0166666667 s is 1 s: no empty interval for what rounding leaves over.
+  const double start = floor(low / *step + 1e-6), end = ceil(high / *step - 1e-6);
+  *first = start * *step;
+  *count = (int)(end - start);
+}
+
 typedef struct axis {
   bool log;
   double low, high, pixel0, pixel1; // in log10 where log
@@ -126,7 +140,7 @@ static bool measure(const ep_chart *chart, axis *x, axis *y) {
       a->low = low[c] - room;
       a->high = high[c] + room;
     } else {
-      ep_plot_ticks(low[c], high[c], 6, &a->first, &a->step, &a->count);
+      ep_chart_ticks(low[c], high[c], 6, &a->first, &a->step, &a->count);
       a->low = a->first;
       a->high = a->first + a->count * a->step;
     }

@@ -32,4 +32,8 @@ ep_status ep_chart_write_svg(const char *path, const ep_chart *chart, ep_error *
 // Twice the chart's size in pixels.
 ep_status ep_chart_write_png(const char *path, const ep_chart *chart, ep_error *err);
 
+// A range of round numbers around low..high in steps of 1, 2 or 5 times a power of ten.
+//   *first <= low, first + count step >= high, but for 1e-6 of a step; about `wanted` steps.
+void ep_chart_ticks(double low, double high, int wanted, double *first, double *step, int *count);
+
 #endif

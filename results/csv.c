@@ -58,39 +58,3 @@ ep_status ep_csv_write(const char *path, int rows, int groups, const ep_csv_grou
   }
   return ep_output_commit(&out, err);
 }
-
-ep_status ep_npy_write(const char *path, int dims, const size_t *shape, const double *data,
-                       ep_error *err) {
-  if (dims < 1 || dims > 4)
-    return ep_fail(err, EP_ERR_ARGUMENT, "an NPY array of %d dimensions; 1 to 4 are possible",
-                   dims);
-  char header[256];
-  size_t count = 1;
-  int length =
-      snprintf(header, sizeof header, "{'descr': '<f8', 'fortran_order': False, 'shape': (");
-  for (int d = 0; d < dims; d++) {
-    count *= shape[d];
-    length += snprintf(header + length, sizeof header - (size_t)length, "%zu,%s", shape[d],
-                       d + 1 < dims ? " " : "");
-  }
-  length += snprintf(header + length, sizeof header - (size_t)length, "), }");
-  // magic, version, length of the header: 10 bytes; data begins at a multiple of 64
-  while ((10 + length + 1) % 64 != 0) header[length++] = ' ';
-  header[length++] = '\n';
-  ep_output out;
-  EP_TRY(ep_output_open(&out, path, err));
-  const unsigned char start[10] = {0x93,
-                                   'N',
-                                   'U',
-                                   'M',
-                                   'P',
-                                   'Y',
-                                   1,
-                                   0,
-                                   (unsigned char)(length & 255),
-                                   (unsigned char)(length >> 8)};
-  fwrite(start, 1, sizeof start, out.file);
-  fwrite(header, 1, (size_t)length, out.file);
-  if (count) fwrite(data, sizeof *data, count, out.file);
-  return ep_output_commit(&out, err);
-}

@@ -1,4 +1,4 @@
-// Tables for spreadsheets and scripts: CSV, and NPY arrays for numpy.
+// Tables for spreadsheets and scripts: CSV.
 #ifndef EP_RESULTS_CSV_H
 #define EP_RESULTS_CSV_H
 
@@ -19,10 +19,6 @@ typedef struct ep_csv_group {
 // fewest digits that read back to the same double (NaN as "nan", infinities as "inf", "-inf").
 // Errors: EP_ERR_ARGUMENT (name), EP_ERR_IO.
 ep_status ep_csv_write(const char *path, int rows, int groups, const ep_csv_group *group,
-                       ep_error *err);
-
-// A little-endian float64 array in C order, NPY version 1.0 (numpy.load reads it). dims 1..4.
-ep_status ep_npy_write(const char *path, int dims, const size_t *shape, const double *data,
                        ep_error *err);
 
 #endif

@@ -1,11 +1,7 @@
 #include "results/gallery.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-
-#include "results/colors.h"
-#include "results/cut.h"
 
 static ep_status no_memory(ep_error *err, int panels) {
   return ep_fail(err, EP_ERR_MEMORY, "no memory for a picture of %d panels", panels);
@@ -114,78 +110,5 @@ ep_status ep_gallery_poses(const char *path, const ep_view *view, int items,
   }
   if (status == EP_OK) status = ep_picture_write(path, view, items, s.panel, err);
   free_sheet(&s);
-  return status;
-}
-
-typedef struct function_label {
-  char text[48];
-} function_label;
-
-ep_status ep_gallery_functions(const char *path, const ep_view *view, const ep_mesh *mesh, int m,
-                               const double *phi, const double *value, ep_error *err) {
-  const size_t nv = (size_t)mesh->nv, count = m > 0 ? (size_t)m : 1;
-  ep_gallery_item *item = calloc(count, sizeof *item);
-  function_label *label = calloc(count, sizeof *label);
-  float *rgb = malloc(count * nv * 3 * sizeof *rgb);
-  ep_status status = item && label && rgb ? EP_OK : no_memory(err, m);
-  for (int i = 0; i < m && status == EP_OK; i++) {
-    float *own = rgb + (size_t)i * nv * 3;
-    ep_color_signed(mesh->nv, phi + (size_t)i * nv, own);
-    if (value)
-      snprintf(label[i].text, sizeof label[i].text, "%d: %.4g", i + 1, value[i]);
-    else
-      snprintf(label[i].text, sizeof label[i].text, "%d", i + 1);
-    item[i] = (ep_gallery_item){.mesh = mesh, .color = own, .label = label[i].text};
-  }
-  if (status == EP_OK) status = ep_gallery_poses(path, view, m, item, 0, err);
-  free(item);
-  free(label);
-  free(rgb);
-  return status;
-}
-
-// Two drawings of one cut: what is left of the surface, and the inside.
-static ep_status draw_cut(const char *path, const ep_view *view, const ep_cut *cut,
-                          const double *field, const char *label, ep_error *err) {
-  float *rgb = NULL;
-  double *carried = NULL;
-  if (field) {
-    rgb = malloc((size_t)cut->nv * 3 * sizeof *rgb);
-    carried = malloc((size_t)cut->nv * sizeof *carried);
-    if (!rgb || !carried) {
-      free(rgb);
-      free(carried);
-      return no_memory(err, 1);
-    }
-    ep_cut_field(cut, 1, field, carried);
-    ep_color_signed(cut->nv, carried, rgb);
-  }
-  ep_drawing part[2];
-  int parts = 0;
-  for (int inside = 0; inside < 2; inside++) {
-    const int first = inside ? cut->outer : 0, count = inside ? cut->nt - first : cut->outer;
-    if (count == 0) continue;
-    ep_drawing *d = &part[parts++];
-    *d = ep_default_drawing(cut->nv, cut->x, count, cut->triangle + 3 * (size_t)first);
-    d->color = rgb;
-    d->hidden_edges = cut->hidden + first;
-    d->edges = inside ? 0.55f : 0.25f;
-    if (!inside) continue;
-    d->tint[0] = 0.93f, d->tint[1] = 0.66f, d->tint[2] = 0.38f;
-  }
-  const ep_panel panel = {parts, part, label};
-  const ep_status status = ep_picture_write(path, view, 1, &panel, err);
-  free(rgb);
-  free(carried);
-  return status;
-}
-
-ep_status ep_gallery_cut(const char *path, const ep_view *view, const ep_mesh *mesh,
-                         const double *x, const double point[3], const double normal[3],
-                         const double *field, const char *label, ep_error *err) {
-  ep_cut cut;
-  EP_TRY(ep_cut_mesh(mesh, x, point, normal, &cut, err));
-  const ep_status status = draw_cut(path, view, &cut, field, label, err);
-  ep_cut_free(&cut);
   return status;
 }

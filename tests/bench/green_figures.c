@@ -11,8 +11,8 @@
 #include "linalg/petsc.h"
 #include "reduced/bake/green_full.h"
 #include "reduced/bake/model_build.h"
+#include "results/chart.h"
 #include "results/csv.h"
-#include "results/plot.h"
 
 enum { SAMPLES = 20 };
 static const double SIZE[3] = {1, 0.25, 0.25};
@@ -69,18 +69,22 @@ static void drift(const bar *b, const double *pose, const char *folder) {
     const ep_csv_group groups[] = {{"w", 1, omega, false}, {"value", 4, table[0], true}};
     snprintf(name, sizeof name, "%s/drift.csv", folder);
     ASSERT_OK(ep_csv_write(name, SAMPLES + 1, 2, groups, err));
-    const ep_plot plot = {.title = "drift and resistance: rest to a twist of 120 degrees",
-                          .x_label = "w",
-                          .y_label = "J",
-                          .width = 900,
-                          .height = 560,
-                          .n = SAMPLES + 1,
-                          .series = 4,
-                          .x = omega,
-                          .y = table[0],
-                          .name = names};
+    double column[4][SAMPLES + 1];
+    ep_chart_series line[4];
+    for (int c = 0; c < 4; c++) {
+      for (int i = 0; i <= SAMPLES; i++) column[c][i] = table[i][c];
+      line[c] = (ep_chart_series){
+          .name = names[c], .n = SAMPLES + 1, .x = omega, .y = column[c], .line = true, .color = c};
+    }
+    const ep_chart chart = {.title = "drift and resistance: rest to a twist of 120 degrees",
+                            .x_label = "w",
+                            .y_label = "J",
+                            .width = 800,
+                            .height = 480,
+                            .series = 4,
+                            .list = line};
     snprintf(name, sizeof name, "%s/drift.png", folder);
-    ASSERT_OK(ep_plot_write(name, &plot, err));
+    ASSERT_OK(ep_chart_write_png(name, &chart, err));
   }
   ep_green_full_free(&full);
   free(path);

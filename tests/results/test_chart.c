@@ -1,6 +1,7 @@
 // Charts. Claims: a point's place in the SVG is affine in the logarithm on a logarithmic axis;
 // names are escaped; points a logarithmic axis cannot hold are left out, and nothing at all is an
-// error; the same chart gives the same bytes, as SVG and as PNG.
+// error; the same chart gives the same bytes, as SVG and as PNG; ticks are round and
+// enclose the data.
 #include "harness.h"
 
 #include <math.h>
@@ -102,11 +103,27 @@ static void same_chart_same_bytes(void **state) {
   free(b);
 }
 
+static void ticks_are_round_and_enclose(void **state) {
+  (void)state;
+  const double range[5][2] = {{0, 1}, {-0.37, 12.2}, {1e-7, 3e-7}, {5, 5}, {-2e5, -1e5}};
+  for (int i = 0; i < 5; i++) {
+    double first, step;
+    int count;
+    ep_chart_ticks(range[i][0], range[i][1], 6, &first, &step, &count);
+    assert_true(first <= range[i][0] * (1 + 1e-12) || first <= range[i][0]);
+    assert_true(first + count * step >= range[i][1] - 1e-9 * step);
+    assert_true(count >= 2 && count <= 14);
+    const double digit = step / pow(10, floor(log10(step) + 1e-9));
+    assert_true(fabs(digit - 1) < 1e-9 || fabs(digit - 2) < 1e-9 || fabs(digit - 5) < 1e-9);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(places_follow_the_axes),
       cmocka_unit_test(what_cannot_be_drawn_is_left_out),
       cmocka_unit_test(same_chart_same_bytes),
+      cmocka_unit_test(ticks_are_round_and_enclose),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

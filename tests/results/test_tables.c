@@ -1,5 +1,5 @@
-// Claims: a CSV file holds the header promised and numbers that read back bit by bit; an NPY file
-// is what the format's description says; a failed write leaves no file and keeps the old one.
+// Claims: a CSV file holds the header promised and numbers that read back bit by bit; a failed
+// write leaves no file and keeps the old one.
 #include "tests/results/harness.h"
 
 #include <math.h>
@@ -50,30 +50,8 @@ static void test_csv_refuses(void **state) {
   assert_int_equal(ep_csv_write("no/such/folder/a.csv", 1, 1, &good, NULL), EP_ERR_IO);
 }
 
-static void test_npy(void **state) {
-  (void)state;
-  const size_t shape[2] = {2, 3};
-  const double x[6] = {1, -2, 3.5, 1e-9, 0, 7};
-  ep_error err = {0};
-  assert_int_equal(ep_npy_write("a.npy", 2, shape, x, &err), EP_OK);
-  char *bytes;
-  size_t size;
-  assert_int_equal(ep_file_read("a.npy", &bytes, &size, &err), EP_OK);
-  assert_memory_equal(bytes, "\x93NUMPY\x01\x00", 8);
-  const size_t header = (unsigned char)bytes[8] + 256u * (unsigned char)bytes[9];
-  assert_int_equal((10 + header) % 64, 0);
-  assert_int_equal(size, 10 + header + sizeof x);
-  assert_int_equal(bytes[10 + header - 1], '\n');
-  const char *want = "{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3,), }";
-  assert_memory_equal(bytes + 10, want, strlen(want));
-  assert_memory_equal(bytes + 10 + header, x, sizeof x);
-  free(bytes);
-  assert_int_equal(ep_npy_write("b.npy", 5, shape, x, NULL), EP_ERR_ARGUMENT);
-}
-
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_csv_round_trip),
-                                     cmocka_unit_test(test_csv_refuses),
-                                     cmocka_unit_test(test_npy)};
+                                     cmocka_unit_test(test_csv_refuses)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
