@@ -23,8 +23,20 @@ typedef struct writer {
   unsigned char *bin;                            // the binary chunk
   size_t used, capacity;
   json_t *views, *accessors;
+  bool lost; // a piece of the text for lack of memory: nothing is written then
   ep_error *err;
 } writer;
+
+// Both take the value over; what is lost shows before anything is written.
+static void put(writer *w, json_t *object, const char *key, json_t *value) {
+  if (json_object_set_new(object, key, value) != 0) w->lost = true;
+}
+static void push(writer *w, json_t *array, json_t *value) {
+  if (json_array_append_new(array, value) != 0) w->lost = true;
+}
+static ep_status no_text(const writer *w) {
+  return ep_fail(w->err, EP_ERR_MEMORY, "no memory for glTF text");
+}
 
 ep_gltf_animation ep_default_gltf(void) {
   return (ep_gltf_animation){
@@ -163,16 +175,15 @@ static ep_status append(writer *w, const void *bytes, size_t size, int target, i
   memcpy(w->bin + w->used, bytes, size);
   json_t *entry = json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", (json_int_t)w->used,
                             "byteLength", (json_int_t)size);
-  if (entry && target) json_object_set_new(entry, "target", json_integer(target));
+  if (target) put(w, entry, "target", json_integer(target));
   w->used += size;
   *view = (int)json_array_size(w->views);
-  return json_array_append_new(w->views, entry) == 0
-             ? EP_OK
-             : ep_fail(w->err, EP_ERR_MEMORY, "no memory for glTF text");
+  push(w, w->views, entry);
+  return EP_OK;
 }
 
 // Bounds of single-precision numbers, exact in JSON: glTF wants them to be the data's own.
-static json_t *bounds(const float *data, size_t count, int components, bool highest) {
+static json_t *bounds(writer *w, const float *data, size_t count, int components, bool highest) {
   json_t *list = json_array();
   for (int k = 0; k < components; k++) {
     float best = data[k];
@@ -180,7 +191,7 @@ static json_t *bounds(const float *data, size_t count, int components, bool high
       const float value = data[i * (size_t)components + (size_t)k];
       if (highest ? value > best : value < best) best = value;
     }
-    json_array_append_new(list, json_real((double)best));
+    push(w, list, json_real((double)best));
   }
   return list;
 }
@@ -188,20 +199,23 @@ static json_t *bounds(const float *data, size_t count, int components, bool high
 static ep_status add_floats(writer *w, const float *data, size_t count, int components, int target,
                             bool bounded, int *accessor) {
   int view;
+  for (size_t i = 0; i < count * (size_t)components; i++)
+    if (!isfinite(data[i]))
+      return ep_fail(w->err, EP_ERR_ARGUMENT,
+                     "glTF: a position, mode or pose is not a number of single precision");
   EP_TRY(append(w, data, count * (size_t)components * sizeof *data, target, &view));
   json_t *entry = json_pack("{s:i, s:i, s:I, s:s}", "bufferView", view, "componentType", FLOAT,
                             "count", (json_int_t)count, "type",
                             components == 4   ? "VEC4"
                             : components == 3 ? "VEC3"
                                               : "SCALAR");
-  if (entry && bounded) {
-    json_object_set_new(entry, "min", bounds(data, count, components, false));
-    json_object_set_new(entry, "max", bounds(data, count, components, true));
+  if (bounded) {
+    put(w, entry, "min", bounds(w, data, count, components, false));
+    put(w, entry, "max", bounds(w, data, count, components, true));
   }
   *accessor = (int)json_array_size(w->accessors);
-  return json_array_append_new(w->accessors, entry) == 0
-             ? EP_OK
-             : ep_fail(w->err, EP_ERR_MEMORY, "no memory for glTF text");
+  push(w, w->accessors, entry);
+  return EP_OK;
 }
 
 static ep_status add_indices(writer *w, int *accessor) {
@@ -211,9 +225,8 @@ static ep_status add_indices(writer *w, int *accessor) {
   *accessor = (int)json_array_size(w->accessors);
   json_t *entry = json_pack("{s:i, s:i, s:I, s:s}", "bufferView", view, "componentType",
                             UNSIGNED_INT, "count", (json_int_t)count, "type", "SCALAR");
-  return json_array_append_new(w->accessors, entry) == 0
-             ? EP_OK
-             : ep_fail(w->err, EP_ERR_MEMORY, "no memory for glTF text");
+  push(w, w->accessors, entry);
+  return EP_OK;
 }
 
 static ep_status add_colors(writer *w, json_t *attributes) {
@@ -224,7 +237,7 @@ static ep_status add_colors(writer *w, json_t *attributes) {
           fminf(1, fmaxf(0, w->a->color[3 * (size_t)w->vertex[v] + (size_t)k]));
   int accessor;
   EP_TRY(add_floats(w, w->position, (size_t)w->nv, 3, ARRAY_BUFFER, false, &accessor));
-  json_object_set_new(attributes, "COLOR_0", json_integer(accessor));
+  put(w, attributes, "COLOR_0", json_integer(accessor));
   return EP_OK;
 }
 
@@ -234,35 +247,35 @@ static ep_status add_targets(writer *w, json_t *targets) {
     make_target(w, mode);
     EP_TRY(add_floats(w, w->position, (size_t)w->nv, 3, ARRAY_BUFFER, true, &position));
     json_t *target = json_pack("{s:i}", "POSITION", position);
-    json_array_append_new(targets, target);
+    push(w, targets, target);
     if (!w->a->target_normals) continue;
     make_normals(w, w->position, w->normal);
     for (int i = 0; i < 3 * w->nv; i++) w->normal[i] -= w->base_normal[i];
     EP_TRY(add_floats(w, w->normal, (size_t)w->nv, 3, ARRAY_BUFFER, false, &normal));
-    json_object_set_new(target, "NORMAL", json_integer(normal));
+    put(w, target, "NORMAL", json_integer(normal));
   }
   return EP_OK;
 }
 
 static ep_status add_primitive(writer *w, json_t *primitive) {
   json_t *attributes = json_object(), *targets = json_array();
-  json_object_set_new(primitive, "attributes", attributes);
-  json_object_set_new(primitive, "material", json_integer(0));
-  json_object_set_new(primitive, "targets", targets);
+  put(w, primitive, "attributes", attributes);
+  put(w, primitive, "material", json_integer(0));
+  put(w, primitive, "targets", targets);
   int accessor;
   EP_TRY(add_indices(w, &accessor));
-  json_object_set_new(primitive, "indices", json_integer(accessor));
+  put(w, primitive, "indices", json_integer(accessor));
   make_base(w);
   EP_TRY(add_floats(w, w->base, (size_t)w->nv, 3, ARRAY_BUFFER, true, &accessor));
-  json_object_set_new(attributes, "POSITION", json_integer(accessor));
+  put(w, attributes, "POSITION", json_integer(accessor));
   if (!w->flat) {
     make_normals(w, NULL, w->base_normal);
     EP_TRY(add_floats(w, w->base_normal, (size_t)w->nv, 3, ARRAY_BUFFER, false, &accessor));
-    json_object_set_new(attributes, "NORMAL", json_integer(accessor));
+    put(w, attributes, "NORMAL", json_integer(accessor));
   }
   EP_TRY(add_colors(w, attributes));
   EP_TRY(add_targets(w, targets));
-  if (w->a->r == 0) json_object_del(primitive, "targets");
+  if (w->a->r == 0) json_object_del(primitive, "targets"); // glTF has no empty lists
   return EP_OK;
 }
 
@@ -292,13 +305,14 @@ typedef struct channels {
 
 static ep_status add_channel(writer *w, channels *c, const float *values, size_t count,
                              int components, int node, const char *path) {
-  int output;
+  int output = -1;
   EP_TRY(add_floats(w, values, count, components, 0, false, &output));
-  json_array_append_new(c->channel, json_pack("{s:i, s:{s:i, s:s}}", "sampler",
-                                              (int)json_array_size(c->sampler), "target", "node",
-                                              node, "path", path));
-  json_array_append_new(c->sampler, json_pack("{s:i, s:i, s:s}", "input", c->input, "output",
-                                              output, "interpolation", "LINEAR"));
+  push(w, c->channel,
+       json_pack("{s:i, s:{s:i, s:s}}", "sampler", (int)json_array_size(c->sampler), "target",
+                 "node", node, "path", path));
+  push(
+      w, c->sampler,
+      json_pack("{s:i, s:i, s:s}", "input", c->input, "output", output, "interpolation", "LINEAR"));
   return EP_OK;
 }
 
@@ -362,9 +376,9 @@ static ep_status add_animation(writer *w, json_t *root) {
   channels c = {.channel = json_array(), .sampler = json_array()};
   const ep_status status = add_channels(w, &c, values);
   free(values);
-  json_object_set_new(root, "animations",
-                      json_pack("[{s:s, s:o, s:o}]", "name", "trajectory", "channels", c.channel,
-                                "samplers", c.sampler));
+  put(w, root, "animations",
+      json_pack("[{s:s, s:o, s:o}]", "name", "trajectory", "channels", c.channel, "samplers",
+                c.sampler));
   return status;
 }
 
@@ -380,58 +394,57 @@ static ep_status add_solid(writer *w, json_t *root, const ep_gltf_solid *solid, 
   own.vertex = NULL, own.index = NULL, own.low = NULL, own.range = NULL;
   own.base = NULL, own.base_normal = NULL, own.position = NULL, own.normal = NULL;
   json_t *primitive = json_object();
-  ep_status status =
-      primitive ? make_index(&own) : ep_fail(w->err, EP_ERR_MEMORY, "no memory for glTF text");
+  ep_status status = primitive ? make_index(&own) : no_text(w);
   if (status == EP_OK) status = make_ranges(&own);
   if (status == EP_OK) status = add_primitive(&own, primitive);
   w->bin = own.bin, w->used = own.used, w->capacity = own.capacity;
+  w->lost = own.lost;
   free_arrays(&own);
   snprintf(name, sizeof name, "obstacle %d", number + 1);
   if (status == EP_OK) {
-    json_object_set_new(primitive, "material", json_integer(1));
-    json_array_append_new(json_object_get(root, "meshes"),
-                          json_pack("{s:s, s:[O]}", "name", name, "primitives", primitive));
-    json_array_append_new(json_object_get(root, "nodes"),
-                          json_pack("{s:i, s:s}", "mesh", number + 1, "name", name));
+    put(w, primitive, "material", json_integer(1));
+    push(w, json_object_get(root, "meshes"),
+         json_pack("{s:s, s:[O]}", "name", name, "primitives", primitive));
+    push(w, json_object_get(root, "nodes"),
+         json_pack("{s:i, s:s}", "mesh", number + 1, "name", name));
     json_t *scene = json_array_get(json_object_get(root, "scenes"), 0);
-    json_array_append_new(json_object_get(scene, "nodes"), json_integer(number + 1));
+    push(w, json_object_get(scene, "nodes"), json_integer(number + 1));
   }
   json_decref(primitive);
   return status;
 }
 
 // Weights at the first frame (without frames: at rest), and the targets' names for editors.
-static void add_mesh(const writer *w, json_t *root, json_t *primitive) {
+static void add_mesh(writer *w, json_t *root, json_t *primitive) {
   json_t *mesh = json_pack("{s:s, s:[O]}", "name", w->a->name, "primitives", primitive);
   if (w->a->r > 0) {
     json_t *weights = json_array(), *names = json_array();
     for (int i = 0; i < w->a->r; i++) {
       char name[32];
       snprintf(name, sizeof name, "mode %d", i);
-      json_array_append_new(names, json_string(name));
-      json_array_append_new(weights, json_real(w->a->frames ? (double)weight(w, 0, i) : 0));
+      push(w, names, json_string(name));
+      push(w, weights, json_real(w->a->frames ? (double)weight(w, 0, i) : 0));
     }
-    json_object_set_new(mesh, "weights", weights);
-    json_object_set_new(mesh, "extras", json_pack("{s:o}", "targetNames", names));
+    put(w, mesh, "weights", weights);
+    put(w, mesh, "extras", json_pack("{s:o}", "targetNames", names));
   }
-  json_object_set_new(root, "meshes", json_pack("[o]", mesh));
+  put(w, root, "meshes", json_pack("[o]", mesh));
 }
 
-static json_t *make_root(const writer *w) {
+static json_t *make_root(writer *w) {
   const float *c = w->a->base_color;
   json_t *root = json_pack("{s:{s:s, s:s}, s:i, s:[{s:[i]}], s:[{s:i, s:s}]}", "asset", "version",
                            "2.0", "generator", "Eigenpose", "scene", 0, "scenes", "nodes", 0,
                            "nodes", "mesh", 0, "name", w->a->name);
   if (!root) return NULL;
-  json_object_set_new(root, "materials",
-                      json_pack("[{s:{s:[f,f,f,f], s:f, s:f}, s:b}]", "pbrMetallicRoughness",
-                                "baseColorFactor", (double)c[0], (double)c[1], (double)c[2], 1.0,
-                                "metallicFactor", 0.0, "roughnessFactor", 0.6, "doubleSided", 1));
+  put(w, root, "materials",
+      json_pack("[{s:{s:[f,f,f,f], s:f, s:f}, s:b}]", "pbrMetallicRoughness", "baseColorFactor",
+                (double)c[0], (double)c[1], (double)c[2], 1.0, "metallicFactor", 0.0,
+                "roughnessFactor", 0.6, "doubleSided", 1));
   if (w->a->solids > 0) // grey, for what is in the way
-    json_array_append_new(json_object_get(root, "materials"),
-                          json_pack("{s:{s:[f,f,f,f], s:f, s:f}}", "pbrMetallicRoughness",
-                                    "baseColorFactor", 0.5, 0.5, 0.48, 1.0, "metallicFactor", 0.0,
-                                    "roughnessFactor", 0.8));
+    push(w, json_object_get(root, "materials"),
+         json_pack("{s:{s:[f,f,f,f], s:f, s:f}}", "pbrMetallicRoughness", "baseColorFactor", 0.5,
+                   0.5, 0.48, 1.0, "metallicFactor", 0.0, "roughnessFactor", 0.8));
   return root;
 }
 
@@ -460,20 +473,18 @@ static ep_status write_container(const char *path, const char *text, const write
 
 static ep_status write_all(const char *path, writer *w, json_t *root) {
   json_t *primitive = json_object();
-  ep_status status = primitive ? add_primitive(w, primitive)
-                               : ep_fail(w->err, EP_ERR_MEMORY, "no memory for glTF text");
+  ep_status status = primitive ? add_primitive(w, primitive) : no_text(w);
   if (status == EP_OK) add_mesh(w, root, primitive);
   json_decref(primitive);
   EP_TRY(status);
   for (int i = 0; i < w->a->solids; i++) EP_TRY(add_solid(w, root, &w->a->solid[i], i));
   EP_TRY(add_animation(w, root));
-  json_object_set(root, "accessors", w->accessors);
-  json_object_set(root, "bufferViews", w->views);
-  json_object_set_new(root, "buffers",
-                      json_pack("[{s:I}]", "byteLength", (json_int_t)((w->used + 3) / 4 * 4)));
+  put(w, root, "accessors", json_incref(w->accessors));
+  put(w, root, "bufferViews", json_incref(w->views));
+  put(w, root, "buffers", json_pack("[{s:I}]", "byteLength", (json_int_t)((w->used + 3) / 4 * 4)));
+  if (w->lost) return no_text(w);
   char *text = json_dumps(root, JSON_COMPACT | JSON_REAL_PRECISION(9));
-  if (!text)
-    return ep_fail(w->err, EP_ERR_ARGUMENT, "glTF: name or numbers cannot be written as JSON");
+  if (!text) return no_text(w);
   status = write_container(path, text, w);
   free(text);
   return status;

@@ -1,6 +1,7 @@
 // Claim: a .glb written is valid glTF 2.0 as far as its text says (chunks, alignment, ranges,
 // bounds), and played back, base + sum_a weight_a target_a, it gives X + U q of every frame to
-// single precision, with every weight in [0, 1].
+// single precision, with every weight in [0, 1]. Without memory, or with numbers that are none,
+// there is no file.
 #include "tests/results/harness.h"
 
 #include <jansson.h>
@@ -224,14 +225,60 @@ static void test_refuses(void **state) {
   assert_int_equal(ep_gltf_write("bad.glb", &a, &err), EP_ERR_ARGUMENT);
   assert_non_null(strstr(err.text, "q1 of frame 2"));
   s = make_setup();
+  s.u[5] = NAN;
+  err = (ep_error){0};
+  assert_int_equal(ep_gltf_write("bad.glb", &a, &err), EP_ERR_ARGUMENT);
+  assert_non_null(strstr(err.text, "not a number"));
+  s = make_setup();
   s.triangle[4] = N;
   assert_int_equal(ep_gltf_write("bad.glb", &a, NULL), EP_ERR_ARGUMENT);
   assert_false(ep_path_exists("bad.glb"));
 }
 
+static long until_failure = -1; // allocations of JSON still to succeed; negative: all do
+
+static void *scarce(size_t size) {
+  if (until_failure == 0) return NULL;
+  if (until_failure > 0) until_failure--;
+  return malloc(size);
+}
+
+// From the k-th allocation of the JSON on there is no memory: an error and no file, for every k up
+// to the one that suffices, and then the file is whole.
+static void test_no_memory_no_file(void **state) {
+  (void)state;
+  setup s = make_setup();
+  ep_gltf_animation a = animation_of(&s);
+  double pose[FRAMES * 12] = {0};
+  for (int f = 0; f < FRAMES; f++)
+    for (int i = 0; i < 3; i++) pose[12 * f + 3 + 4 * i] = 1;
+  const ep_gltf_solid solid = {
+      .n = N, .x = s.x, .triangles = TRIANGLES, .triangle = s.triangle, .pose = pose};
+  a.pose = pose, a.solids = 1, a.solid = &solid;
+  ep_digest whole, scant;
+  assert_int_equal(ep_gltf_write("whole.glb", &a, NULL), EP_OK);
+  assert_int_equal(ep_hash_file("whole.glb", &whole, NULL), EP_OK);
+  json_set_alloc_funcs(scarce, free);
+  int k = 0;
+  for (;; k++) {
+    until_failure = k;
+    ep_error err = {0};
+    const ep_status status = ep_gltf_write("scant.glb", &a, &err);
+    until_failure = -1;
+    if (status == EP_OK) break;
+    assert_true(err.text[0]);
+    assert_false(ep_path_exists("scant.glb"));
+  }
+  json_set_alloc_funcs(malloc, free);
+  assert_true(k > 100);
+  assert_int_equal(ep_hash_file("scant.glb", &scant, NULL), EP_OK);
+  assert_string_equal(whole.hex, scant.hex);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_plays_back), cmocka_unit_test(test_normals),
-      cmocka_unit_test(test_still_and_repeatable), cmocka_unit_test(test_refuses)};
+      cmocka_unit_test(test_still_and_repeatable), cmocka_unit_test(test_refuses),
+      cmocka_unit_test(test_no_memory_no_file)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
