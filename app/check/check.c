@@ -154,8 +154,12 @@ static ep_status check_usage(const ep_cli *cli, ep_error *err) {
 static ep_status check_file(const ep_cli *cli, const char *path, ep_check *check, ep_error *err) {
   if (!is_scene(path)) return ep_check_mesh_file(check, path, NULL, err);
   ep_scene scene;
-  EP_TRY(ep_scene_read(path, cli->nsets, cli->set, &scene, err));
-  const ep_status status = ep_check_scene(check, &scene, err);
+  ep_error bad = {0};
+  ep_status status = ep_scene_read(path, cli->nsets, cli->set, &scene, &bad);
+  if (status == EP_ERR_IO || status == EP_ERR_MEMORY) return ep_fail(err, status, "%s", bad.text);
+  if (status != EP_OK)
+    return ep_check_add(check, EP_FOUND_ERROR, "scene", path, false, err, "%s", bad.text);
+  status = ep_check_scene(check, &scene, err);
   ep_scene_free(&scene);
   return status;
 }

@@ -1,7 +1,9 @@
 // The folder of a stress test: a page, a table, a record, a file for every failure.
+#include <dirent.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "app/report.h"
 #include "app/stress/stress.h"
@@ -85,6 +87,25 @@ static json_t *failure_json(const ep_stress_result *r) {
                    ep_json_numbers(r->r, r->v), "position", ep_json_numbers(3, r->frame.c),
                    "rotation", ep_json_numbers(9, r->frame.R), "velocity",
                    ep_json_numbers(3, r->velocity), "spin", ep_json_numbers(3, r->spin));
+}
+
+// An earlier report in the same folder may have left failures of its own.
+static ep_status remove_failures(const char *folder, ep_error *err) {
+  char path[EP_PATH_MAX], file[EP_PATH_MAX];
+  EP_TRY(ep_path_join(folder, "failures", path, err));
+  DIR *list = opendir(path);
+  if (!list) return EP_OK; // there are none; what stands in the way shows on writing
+  ep_status status = EP_OK;
+  for (struct dirent *entry; status == EP_OK && (entry = readdir(list));) {
+    int number, end = 0;
+    if (sscanf(entry->d_name, "case-%d.json%n", &number, &end) != 1 || !end || entry->d_name[end])
+      continue;
+    status = ep_path_join(path, entry->d_name, file, err);
+    if (status == EP_OK) status = ep_file_remove(file, err);
+  }
+  closedir(list);
+  rmdir(path); // stays where it holds files of somebody else
+  return status;
 }
 
 static ep_status write_failures(const char *folder, const ep_stress_report *report, ep_error *err) {
@@ -249,6 +270,7 @@ static ep_status write_text(const char *folder, const char *name, const ep_stres
 ep_status ep_stress_write(const char *folder, const ep_stress_report *report, ep_error *err) {
   char path[EP_PATH_MAX];
   EP_TRY(ep_make_folders(folder, err));
+  EP_TRY(remove_failures(folder, err));
   EP_TRY(write_text(folder, "index.html", report, page, err));
   EP_TRY(write_text(folder, "results.csv", report, csv, err));
   EP_TRY(ep_path_join(folder, "results.json", path, err));

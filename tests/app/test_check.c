@@ -249,6 +249,12 @@ static void usage(void **state) {
   assert_int_equal(program("", "check sound.veg"), 0);
   assert_int_equal(program("", "check sound.veg islands.veg"), 10);
   has_text("out.txt", "islands.veg: islands:");
+  // a scene that cannot be read is a finding as well, and the next file has its turn
+  write_text("bad.yaml", "schema: 1\nobject: {mesh: sound.veg}\nreduction: {mods: 3}\n");
+  assert_int_equal(program("", "check bad.yaml islands.veg"), 10);
+  has_text("out.txt", "bad.yaml:3:13: unknown key");
+  has_text("out.txt", "islands.veg: islands:");
+  assert_int_equal(program("", "check absent.yaml islands.veg"), 2);
   assert_int_equal(program("", "check sound.veg absent.veg"), 2);
   assert_int_equal(program("", "check"), 1);
   assert_int_equal(program("", "check sound.veg islands.veg --repair x.veg"), 1);
@@ -311,7 +317,8 @@ static void scenes_are_checked(void **state) {
   expect_scene(SCENE(HELD), 0, NULL, NULL);
   expect_scene("schema: 1\nobject: {mesh: sound.veg}\nreduction: {modes: 150}\n" HELD, 10, "scene",
                "unknowns");
-  expect_scene("schema: 1\nobject: {mesh: sound.veg, oops: 1}\n", 5, NULL, NULL);
+  expect_scene("schema: 1\nobject: {mesh: sound.veg, oops: 1}\n", 10, "scene",
+               "unknown key 'oops'");
 }
 
 static void real_meshes(void **state) {
