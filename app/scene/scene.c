@@ -196,7 +196,7 @@ ep_status ep_scene_parse(const char *path, const char *folder, const char *text,
   ep_scene_text loaded;
   EP_TRY(ep_scene_load(path, text, size, nsets, sets, &loaded, err));
   const ep_scene_reader r = {
-      .loaded = &loaded, .name = path, .folder = folder, .overridden = nsets > 0, .err = err};
+      .loaded = &loaded, .name = path, .folder = folder, .nsets = nsets, .sets = sets, .err = err};
   const ep_status status = convert(&r, loaded.raw, out);
   ep_scene_unload(&loaded);
   if (status != EP_OK) ep_scene_free(out);

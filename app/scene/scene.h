@@ -32,7 +32,7 @@ typedef struct ep_selection {
   char *path;        // file; name of the array
   double value;      // of the array: chosen above it, or where it is that
   bool equals;
-  char key[192]; // where it stands: "bar.yaml:7:5: fixed.0", for messages
+  char key[232]; // where it stands: "bar.yaml:7:5: fixed.0", for messages
 } ep_selection;
 
 // A part of the object where examples act: weight 1 on `where`, falling smoothly to 0 over the

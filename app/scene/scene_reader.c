@@ -7,16 +7,46 @@
 
 #include "base/files.h"
 
+// The last --set that gives the value at a dotted key, something in it, or what it stands in;
+// *length of its own key. NULL where none does.
+static const char *set_of(const ep_scene_reader *r, const char *key, int *length) {
+  for (int i = r->nsets; i-- > 0;) {
+    const char *set = r->sets[i];
+    const size_t own = strcspn(set, "="), asked = strlen(key), common = own < asked ? own : asked;
+    const char after = own < asked ? key[own] : set[asked];
+    if (strncmp(set, key, common) != 0 || (own != asked && after != '.')) continue;
+    *length = (int)own;
+    return set;
+  }
+  return NULL;
+}
+
+// ":line:column: key" in the file, ": --set key" for what comes from the command line. The end of a
+// long name says more than its beginning.
+static void place_of(const ep_scene_reader *r, const char *key, char *out, size_t size) {
+  int line, column, own;
+  const char *set = set_of(r, key, &own);
+  if (set && (size_t)own == strlen(key))
+    snprintf(out, size, ": --set %.60s", key);
+  else if (set)
+    snprintf(out, size, ": --set %.*s: %.60s", own < 60 ? own : 60, set, key);
+  else if (ep_yaml_locate(&r->loaded->yaml, key, &line, &column) || !r->nsets)
+    snprintf(out, size, ":%d:%d: %.60s", line, column, key);
+  else
+    snprintf(out, size, " with --set: %.60s", key);
+}
+
 ep_status ep_read_refuse(const ep_scene_reader *r, const char *key, const char *format, ...) {
   char text[512];
   va_list args;
   va_start(args, format);
   vsnprintf(text, sizeof text, format, args);
   va_end(args);
-  int line, column;
-  ep_yaml_locate(&r->loaded->yaml, key, &line, &column);
-  return ep_fail(r->err, EP_ERR_SCENE, "%s:%d:%d: %s: %s%s", r->name, line, column, key, text,
-                 r->overridden ? " (with --set)" : "");
+  char place[136];
+  place_of(r, key, place, sizeof place);
+  const bool in_file = r->nsets && !strstr(place, "--set"); // another key's value may not fit it
+  return ep_fail(r->err, EP_ERR_SCENE, "%s%s: %s%s", r->name, place, text,
+                 in_file ? " (with --set)" : "");
 }
 
 ep_status ep_read_number(const ep_scene_reader *r, const char *key, const double *given,
@@ -71,14 +101,13 @@ static ep_status field_selection(const ep_scene_reader *r, const char *key,
   return ep_read_text(r, raw->field, &out->path);
 }
 
-// Whether anything lies there shows when the mesh is read: the place is kept for that message. The
-// end of a long path says more than its beginning.
+// Whether anything lies there shows when the mesh is read: the place is kept for that message.
 static void set_place(const ep_scene_reader *r, const char *key, ep_selection *out) {
   const size_t length = strlen(r->name), most = 90;
-  int line, column;
-  ep_yaml_locate(&r->loaded->yaml, key, &line, &column);
-  snprintf(out->key, sizeof out->key, "%s%.90s:%d:%d: %.60s", length > most ? "..." : "",
-           r->name + (length > most ? length - most : 0), line, column, key);
+  char place[136];
+  place_of(r, key, place, sizeof place);
+  snprintf(out->key, sizeof out->key, "%s%.90s%.135s", length > most ? "..." : "",
+           r->name + (length > most ? length - most : 0), place);
 }
 
 ep_status ep_read_selection(const ep_scene_reader *r, const char *key, const raw_selection *raw,

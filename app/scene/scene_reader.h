@@ -10,7 +10,8 @@
 typedef struct ep_scene_reader {
   ep_scene_text *loaded;
   const char *name, *folder;
-  bool overridden; // with --set the places of the file no longer tell
+  int nsets;
+  const char *const *sets; // key=value of --set: the place of what they give is there
   ep_error *err;
 } ep_scene_reader;
 

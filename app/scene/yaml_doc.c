@@ -127,16 +127,21 @@ static int child(yaml_document_t *document, const yaml_node_t *node, const char 
   return index >= 0 && index < count ? node->data.sequence.items.start[index] : 0;
 }
 
-void ep_yaml_locate(ep_yaml *yaml, const char *path, int *line, int *column) {
+int ep_yaml_locate(ep_yaml *yaml, const char *path, int *line, int *column) {
   char component[KEY_MAX];
   const yaml_node_t *node = yaml_document_get_root_node(&yaml->document);
+  int found = 1;
   while (node && next_component(&path, component)) {
     const int next = child(&yaml->document, node, component);
-    if (!next) break;
+    if (!next) {
+      found = 0;
+      break;
+    }
     node = yaml_document_get_node(&yaml->document, next);
   }
   *line = node ? (int)node->start_mark.line + 1 : 1;
   *column = node ? (int)node->start_mark.column + 1 : 1;
+  return node ? found : 0;
 }
 
 static bool before(int line_a, int column_a, int line_b, int column_b) {

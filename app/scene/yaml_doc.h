@@ -19,8 +19,8 @@ ep_status ep_yaml_parse(const char *name, const char *text, size_t size, ep_yaml
 void ep_yaml_free(ep_yaml *yaml);
 
 // Line and column, from 1, of the value at a dotted path ("families.0.map.accept"), of the nearest
-// ancestor that exists otherwise.
-void ep_yaml_locate(ep_yaml *yaml, const char *path, int *line, int *column);
+// ancestor that exists otherwise. Returns 0 where the value itself is not there.
+int ep_yaml_locate(ep_yaml *yaml, const char *path, int *line, int *column);
 
 // Line and column of the first mapping key `key` that starts after the given place.
 // Returns 0 where there is none.

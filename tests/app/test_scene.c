@@ -236,7 +236,19 @@ static void overrides_are_checked_like_the_file(void **state) {
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     assert_int_equal(parse_with(HEAD, 1, &bad[i], &s, &err), EP_ERR_SCENE);
     assert_non_null(strstr(err.text, "--set"));
+    assert_null(strstr(err.text, ":1:1:")); // no place in a file that does not hold the value
   }
+  // what is refused names the --set it comes from, also where another value shows it
+  const char *corner[] = {"fixed.0={box: {low: [0, 0, 0], high: [1, 1, 1]}}", "seed=3",
+                          "fixed.0.box.low=[2, 0, 0]"};
+  assert_int_equal(parse_with(HEAD, 3, corner, &s, &err), EP_ERR_SCENE);
+  assert_non_null(strstr(err.text, "s.yaml: --set fixed.0.box.low: fixed.0: box: low 2 lies"));
+  assert_int_equal(parse_with(HEAD, 1, &bad[1], &s, &err), EP_ERR_SCENE);
+  assert_non_null(strstr(err.text, "s.yaml: --set reduction.modes: 1.5 is not a whole number"));
+  // a value of the file keeps its place, whatever else is set
+  const char *seed = "seed=3";
+  assert_int_equal(parse_with(HEAD "reduction:\n  modes: 1.5\n", 1, &seed, &s, &err), EP_ERR_SCENE);
+  assert_non_null(strstr(err.text, "s.yaml:4:10: reduction.modes: 1.5"));
 }
 
 // Vertices of the 4 x 1 x 1 box with cells of 0.25: 5 x 2 x 2.
