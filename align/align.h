@@ -1,5 +1,6 @@
 // Maps between shapes: regions, frames, product-space matching, coupled bases, composition, and
-// the record by which a person can judge a map. (Kovnatsky et al. 2013; DESIGN "Maps".)
+// the record by which a person can judge a map. (Kovnatsky et al. 2013; docs/method.md
+// "Maps".)
 #ifndef EP_ALIGN_ALIGN_H
 #define EP_ALIGN_ALIGN_H
 
@@ -147,7 +148,7 @@ typedef struct ep_map_options {
 } ep_map_options;
 ep_map_options ep_default_map_options(void);
 
-// Product-space matching with reframing (DESIGN, measured recipe). Uses up to 12 functions, between
+// Product-space matching with reframing (docs/method.md "Maps"). Uses up to 12 functions, between
 // shapes of one family 32 (or m), where the spaces hold them; the coupling residuals up to 2m of
 // `to`: compute spaces of max(20, 2m), of max(32, 2m) within a family. Errors: EP_ERR_ARGUMENT (m
 // larger than the spaces), EP_ERR_MATCH (component counts differ). A bad map is no error here: the

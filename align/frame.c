@@ -7,7 +7,7 @@
 
 // Region centroids must reach this share of the rms radius in two directions to fix a rotation.
 static const double FRAME_SPREAD = 0.1;
-// Fewer points do not fix a frame reliably (DESIGN: 6 always right, 3 in 27 of 30, 2 no help).
+// Fewer points do not fix a frame reliably (6 always right, 3 in 27 of 30, 2 no help).
 enum { FRAME_REGIONS = 4, FRAME_ROUNDS = 20 };
 
 void ep_frame_identity(double r[9]) {

@@ -5,8 +5,8 @@
 #include "align/private.h"
 #include "linalg/dense.h"
 
-// Weights and numbers of functions measured over eleven pairs of shapes (DESIGN "Maps and coupled
-// bases", recipe, step 3). Between poses of one family positions mislead more.
+// Weights and numbers of functions measured over eleven pairs of shapes (docs/method.md
+// "Maps"). Between poses of one family positions mislead more.
 static const double GAMMA_SHAPES = 4, GAMMA_FAMILY = 2;
 enum { FUNCTIONS_SHAPES = 12, FUNCTIONS_FAMILY = 20 };
 // Shapes of one family agree in their finer functions too. Mean error of nine maps rest <- pose

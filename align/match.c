@@ -1,4 +1,4 @@
-// Product-space matching (DESIGN "Maps and coupled bases"; after ZoomOut, Melzi et al. 2019, and
+// Product-space matching (docs/method.md "Maps"; after ZoomOut, Melzi et al. 2019, and
 // product manifold filters, Vestner et al. 2017): nearest neighbours of [Phi_o | a y | w S_o] to
 // [Phi_e C^T | a x_e | w S_e] while the number of functions kk rises.
 #include <math.h>

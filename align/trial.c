@@ -3,7 +3,7 @@
 
 #include "align/private.h"
 
-// Reframing stops when the frame turns by less (DESIGN, recipe, step 4).
+// Reframing stops when the frame turns by less.
 static const double REFRAME_DEGREES = 5;
 
 ep_status ep_trial_make(const ep_side *from, const ep_side *to, ep_trial *t, ep_error *err) {

@@ -15,11 +15,11 @@ enum { GUIDING_LANDMARKS = 5, GUIDING_REGIONS = 4 };
 // Left and right kept: right maps between shapes >= .83, between poses of one family >= .90 (a
 // squatting gorilla; the others .98); two landmarks exchanged <= .86, all of them mostly <= .3.
 static const double HANDED_DOUBTFUL = 0.72, HANDED_DOUBTFUL_FAMILY = 0.86, HANDED_BAD = 0.25;
-// Jaccard: usable maps had .64 and more, failed ones .37-.43 (DESIGN "Maps").
+// Jaccard: usable maps had .64 and more, failed ones .37-.43.
 static const double JACCARD_DOUBTFUL = 0.5, JACCARD_BAD = 0.3;
 // Coverage: a map that leaves a third of the example out misses a limb. Right maps >= .70.
 static const double COVERAGE_DOUBTFUL = 0.65, COVERAGE_BAD = 0.3;
-// Poses of one family turn by up to 57 degrees (DESIGN "Maps"): a larger turn may be wrong.
+// Poses of one family turn by up to 57 degrees: a larger turn may be wrong.
 static const double FRAME_DOUBTFUL_FAMILY = 60;
 
 // One measure against its two thresholds; high: large values are bad.

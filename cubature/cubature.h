@@ -1,5 +1,5 @@
-// Cubature: few elements with weights that stand for all (An, Kim, James 2008; DESIGN "Cubature
-// training"): training poses, Gram system, greedy NNLS.
+// Cubature: few elements with weights that stand for all (An, Kim, James 2008; docs/method.md
+// "Cubature training"): training poses, Gram system, greedy NNLS.
 #ifndef EP_CUBATURE_CUBATURE_H
 #define EP_CUBATURE_CUBATURE_H
 

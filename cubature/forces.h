@@ -25,7 +25,7 @@ typedef struct ep_pose {
 // F_e at q, row-major. Returns det F.
 double ep_element_gradient(const ep_elements *elements, int e, const double *q, double f[9]);
 
-// Generalised force of element e per unit of its rest volume (DESIGN "Cubature training"):
+// Generalised force of element e per unit of its rest volume (docs/method.md "Cubature training"):
 //   rest:      G^T P(F)
 //   reference: v_i G^T P(F F_i^-1) F_i^-T, v_i from ep_reference_element
 // times its share, into out (r). Returns det of F or of F F_i^-1; 1 and a zero force where the

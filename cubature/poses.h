@@ -1,5 +1,5 @@
-// Training poses (DESIGN "Cubature training"): random in the subspace, along the example paths,
-// relative to the examples.
+// Training poses (docs/method.md "Cubature training"): random in the subspace, along the example
+// paths, relative to the examples.
 #ifndef EP_CUBATURE_POSES_H
 #define EP_CUBATURE_POSES_H
 

@@ -8,7 +8,7 @@
 #include "reduced/reference.h"
 
 // The matrix of element forces may take this much memory; above, its rows are sketched, but to no
-// fewer than ROWS_PER_ELEMENT for each element wanted (DESIGN: about 5 s). On 30,481 tets, s = 60:
+// fewer than ROWS_PER_ELEMENT for each element wanted. On 30,481 tets, s = 60:
 // 1,049 of 6,000 rows gave a held-out error of .0076 in 9 s, 2,099 rows .0084 in 22 s.
 static const double matrix_bytes = 256e6;
 enum { ROWS_PER_ELEMENT = 5, SHORTLIST = 64, POOL = 100, EXCHANGES = 12 };

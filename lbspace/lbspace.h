@@ -1,5 +1,6 @@
 // Volumetric Laplace-Beltrami space of a tet mesh: operators, eigenpairs, descriptors, poses.
-// K phi = lambda M phi with linear elements, consistent mass, natural boundary (DESIGN section 3).
+// K phi = lambda M phi with linear elements, consistent mass, natural boundary (docs/method.md
+// "Laplace-Beltrami space").
 #ifndef EP_LBSPACE_LBSPACE_H
 #define EP_LBSPACE_LBSPACE_H
 
@@ -30,7 +31,7 @@ void ep_lb_project(const ep_lb *lb, const ep_csr *mass, const double *u, double 
 void ep_lb_reconstruct(const ep_lb *lb, const double *d, double *u);
 
 // Complete a pose: the shape whose low LB coefficients are Phi^T M X + d and which is otherwise as
-// rigid as possible (LB-ARAP, DESIGN "Example poses on the object's mesh").
+// rigid as possible (LB-ARAP, docs/method.md "Pose transfer").
 // Nothing held: the coefficients are met exactly; the mean displacement (the constant function) is
 // zero. Held vertices: that pose is first moved rigidly so that they come to rest as well as they
 // can, its coefficients become the target, and a second LB-ARAP among the displacements that vanish

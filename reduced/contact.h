@@ -1,8 +1,8 @@
-// Contact of the reduced object with rigid obstacles (DESIGN "Contact"). Surface vertices are found
-// by a tree of bounding balls whose centres and radii follow q (James and Pai 2004, BD-Tree:
-// output-sensitive collision detection for reduced deformable models), so the cost follows the
-// number of vertices that touch. Each acts by reduced/contact_point.h, its gradient pulled back by
-// [R U_i, I, -(x - c) x]. Nothing is stored per vertex.
+// Contact of the reduced object with rigid obstacles (docs/method.md "Contact"). Surface vertices
+// are found by a tree of bounding balls whose centres and radii follow q (James and Pai 2004,
+// BD-Tree: output-sensitive collision detection for reduced deformable models), so the cost follows
+// the number of vertices that touch. Each acts by reduced/contact_point.h, its gradient pulled back
+// by [R U_i, I, -(x - c) x]. Nothing is stored per vertex.
 //
 // A step: ep_contact_begin; minimise with ep_contact_energy; while ep_contact_again, minimise once
 // more from there; ep_contact_measure.

@@ -1,5 +1,5 @@
-// St. Venant-Kirchhoff energy of a reduced model, exact, as one quartic form (DESIGN "Elastic
-// energy"; Barbic and James 2005, with full symmetry).
+// St. Venant-Kirchhoff energy of a reduced model, exact, as one quartic form (docs/method.md
+// "Elastic energy"; Barbic and James 2005, with full symmetry).
 //
 // With z = (1, q), N = r + 1 entries, the energy is
 //   W = sum over a >= b >= c >= d of w_abcd z_a z_b z_c z_d,

@@ -1,8 +1,8 @@
 // Included once per instruction-set level and precision, with EP_CUBIC_KERNEL (the name of the
 // function it defines) and REAL / LANES: double / 8 or float / 16 (64-byte vectors).
 //
-// Block form (DESIGN section 7). Rows are pairs a >= b in blocks of 4 x 4, columns the packed pairs
-// c >= d up to b. Each vector S of coefficients serves three multiply-adds:
+// Block form (docs/method.md "Floats and bits"). Rows are pairs a >= b in blocks of 4 x 4, columns
+// the packed pairs c >= d up to b. Each vector S of coefficients serves three multiply-adds:
 //   K_ab += S . zz,   T_a,cd += z_b S,   T_b,cd += z_a S
 // and what T holds gives the other five positions of the second derivative:
 //   (x, c) += T_x,cd z_d,   (x, d) += T_x,cd z_c,   (c, d) += z_x T_x,cd / 2

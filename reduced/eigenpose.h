@@ -60,8 +60,9 @@ typedef struct ep_model {
 #undef X
 } ep_model;
 
-// Open an .epm (DESIGN section 4) in memory: `bytes` 64-byte aligned, kept by the caller as long as
-// the model is used. Every offset, size and dtype is checked, contents (finite, weights >= 0) too.
+// Open an .epm (docs/method.md "Model file") in memory: `bytes` 64-byte aligned, kept by the caller
+// as long as the model is used. Every offset, size and dtype is checked, contents (finite, weights
+// >= 0) too.
 //   message (may be NULL; at least 256 chars): what is wrong and where.
 // Errors: EP_ERR_FORMAT (truncated, foreign, future schema), EP_ERR_ARGUMENT (alignment).
 ep_status ep_model_open(const void *bytes, size_t size, ep_model *model, char *message);
@@ -117,14 +118,14 @@ void ep_state_positions(const ep_state *state, double *x);
 
 // ---- energies --------------------------------------------------------------------------------
 // (Not ep_elastic: that is the type of material constants in mesh/mesh.h.)
-// Elastic energy of the model at q by its evaluator, with that of its guards; f (r) = dW/dq and stiffness k (r x r,
-// symmetric, both triangles) unless NULL. project != 0: element tangents projected to positive
-// semidefinite. Uses the state's scratch, changes nothing else.
+// Elastic energy of the model at q by its evaluator, with that of its guards; f (r) = dW/dq and
+// stiffness k (r x r, symmetric, both triangles) unless NULL. project != 0: element tangents
+// projected to positive semidefinite. Uses the state's scratch, changes nothing else.
 double ep_elastic_energy(ep_state *state, const double *q, double *f, double *k, int project);
 
 // Energy of deforming the examples, weighted by w (k), into configuration q:
-//   sum_i w_i sum_j w_j |det F_ij| psi(F_j(q) F_ij^-1)   (Zhao et al. 2018 eq. 4 and 6; DESIGN
-// "Shape interpolation"), gradient f and Hessian h as in ep_elastic_energy.
+//   sum_i w_i sum_j w_j v_ij psi(F_j(q) F_ij^-1)   (Zhao et al. 2018 eq. 4 and 6; docs/method.md
+// "Shape interpolation"; v_ij: |det F_ij|, less where squeezed, reduced/reference.h), gradient f and Hessian h as in ep_elastic_energy.
 double ep_example_energy(ep_state *state, const double *w, const double *q, double *f, double *h,
                          int project);
 

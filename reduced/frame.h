@@ -1,4 +1,4 @@
-// Free motion: the moving frame of an object nothing holds (DESIGN "Free motion").
+// Free motion: the moving frame of an object nothing holds (docs/method.md "Free motion").
 //
 //   x_i = c + R (X_i - X_0 + U_i q)
 //

@@ -1,4 +1,4 @@
-// The moving part of a free object's step (DESIGN "Free motion"). Private to the run time.
+// The moving part of a free object's step (docs/method.md "Free motion"). Private to the run time.
 //
 // In the body's axes q obeys q'' + 2 C q' + C(omega') q = F + 1/2 dJ/dq(omega, omega), with
 // C_ba = omega . h_ab antisymmetric. Written for the momentum p = q' + C q, q and p turn by -C

@@ -1,4 +1,5 @@
-// The Green-strain example potential (Zhang et al. 2015, eq. 7 to 10; DESIGN "Green-strain path").
+// The Green-strain example potential (Zhang et al. 2015, eq. 7 to 10; docs/method.md
+// "Green-strain path").
 //
 // The examples' strains E_j were orthonormalised offline in <A, B> = 1/2 sum V A : C : B, so that
 // with y_i = <O_i, E(q)>, O = V-combinations of the E_j (w = V y), and weak constraints

@@ -1,5 +1,5 @@
-// Implicit time integrators as one incremental potential (DESIGN "Time step"): each is told by what
-// it makes of velocity and acceleration at the new configuration x,
+// Implicit time integrators as one incremental potential (docs/method.md "Time step"): each is told
+// by what it makes of velocity and acceleration at the new configuration x,
 //   v(x) = rate (x - base),   a(x) = inertia (x - ahead),
 // and then x minimises inertia/2 |x - ahead|_M^2 + rate/2 |x - base|_D^2 + W(x) - f . x, which is
 // the equation of motion M a + D v + dW/dx = f at the end of the step. The subspace and the full

@@ -1,4 +1,4 @@
-// A free object together with the world (DESIGN "Free motion", "Contact").
+// A free object together with the world (docs/method.md "Free motion", "Contact").
 #include <math.h>
 #include <string.h>
 

@@ -9,10 +9,11 @@ extern "C" {
 
 typedef enum ep_material {
   EP_STVK,              // psi = lambda/2 tr(E)^2 + mu E:E, E = (F^T F - I)/2
-  EP_STVK_VOLUME,       // the same plus k/2 min(0, J - 0.5)^2, k = 10 max(lambda, mu): DESIGN
-                        // "Cubature" has 10 lambda, which is the same from Poisson's ratio 0.25
-                        // on; below, mu keeps the penalty alive (lambda = 0 at ratio 0)
-  EP_STABLE_NEOHOOKEAN, // Smith et al. 2018, in the cancellation-free strain form of DESIGN
+  EP_STVK_VOLUME,       // the same plus k/2 min(0, J - 0.5)^2, k = 10 max(lambda, mu):
+                        // 10 lambda from Poisson's ratio 0.25 on; below, mu keeps the penalty
+                        // alive (lambda = 0 at ratio 0)
+  EP_STABLE_NEOHOOKEAN, // Smith et al. 2018, in the cancellation-free strain form of
+                        // docs/method.md "Elastic energy"
   EP_COROTATIONAL,      // mu |F - R|^2 + lambda/2 tr(R^T F - I)^2, R the nearest rotation
   EP_MATERIALS
 } ep_material;

@@ -1,4 +1,5 @@
-// Small dense algebra and the safeguarded Newton both minimisations use (DESIGN "Time step").
+// Small dense algebra and the safeguarded Newton both minimisations use (docs/method.md "Time
+// step").
 #include <math.h>
 #include <string.h>
 

@@ -1,7 +1,7 @@
-// Local examples (Zhao et al. 2018, sec. 5; DESIGN "Local examples"): sets of examples, each with
-// the part of the object it acts on, with descriptors, weights and a target of its own. A model
-// without regions has one set, of all its examples, and none of the region arrays. Private to the
-// run time.
+// Local examples (Zhao et al. 2018, sec. 5; docs/method.md "Local examples"): sets of examples,
+// each with the part of the object it acts on, with descriptors, weights and a target of its own. A
+// model without regions has one set, of all its examples, and none of the region arrays. Private to
+// the run time.
 #ifndef EP_REDUCED_REGION_H
 #define EP_REDUCED_REGION_H
 

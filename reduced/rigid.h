@@ -1,5 +1,6 @@
-// Inertia of a free object in its moving frame, and rotations (DESIGN "Free motion"). Private to
-// the run time. Symmetric 3 x 3 matrices are packed as xx yy zz yz zx xy, full ones row-major.
+// Inertia of a free object in its moving frame, and rotations (docs/method.md "Free motion").
+// Private to the run time. Symmetric 3 x 3 matrices are packed as xx yy zz yz zx xy, full ones
+// row-major.
 #ifndef EP_REDUCED_RIGID_H
 #define EP_REDUCED_RIGID_H
 

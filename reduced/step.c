@@ -1,5 +1,5 @@
-// A step as the minimum of the incremental potential (DESIGN "Time step"; reduced/integrator.h), in
-// mass-orthonormal coordinates (U^T M U = I):
+// A step as the minimum of the incremental potential (docs/method.md "Time step";
+// reduced/integrator.h), in mass-orthonormal coordinates (U^T M U = I):
 //   Phi(x) = inertia |x - ahead|^2 / 2 + rate (x - base)^T D (x - base) / 2 + W(x) + beta W_t(x) -
 //   f . x + contact(x)
 // with D = alpha I + beta' K0 and the target's energy W_t frozen within the step; relief takes its

@@ -1,5 +1,5 @@
-// The target configuration: minimum over q of sum_i w_i E(q, e_i) (Zhao et al. 2018 eq. 6; DESIGN
-// "Shape interpolation").
+// The target configuration: minimum over q of sum_i w_i E(q, e_i) (Zhao et al. 2018 eq. 6;
+// docs/method.md "Shape interpolation").
 #include <math.h>
 #include <string.h>
 

@@ -1,5 +1,5 @@
 // The reduced basis: linear modes, modal derivatives, example path samples, mass-PCA.
-// (Barbic and James 2005; Zhang et al. 2015 sec. 5; DESIGN "Basis".)
+// (Barbic and James 2005; Zhang et al. 2015 sec. 5; docs/method.md "Basis".)
 #ifndef EP_BAKE_BASIS_H
 #define EP_BAKE_BASIS_H
 

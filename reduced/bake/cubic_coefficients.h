@@ -1,5 +1,6 @@
-// Coefficients of the reduced StVK energy (reduced/cubic.h), exact, over all elements (DESIGN
-// "Elastic energy"; Barbic and James 2005 sec. 4.1, by one symmetric rank-k update).
+// Coefficients of the reduced StVK energy (reduced/cubic.h), exact, over all elements
+// (docs/method.md "Elastic energy"; Barbic and James 2005 sec. 4.1, by one symmetric rank-k
+// update).
 #ifndef EP_BAKE_CUBIC_COEFFICIENTS_H
 #define EP_BAKE_CUBIC_COEFFICIENTS_H
 

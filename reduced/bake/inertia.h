@@ -1,6 +1,6 @@
-// What an object nothing holds needs of the bake (DESIGN "Free motion"): its six rigid modes, to
-// keep the basis free of them; supports that take them out of equations; the best rigid fit of a
-// pose to rest; the inertia sums of the moving frame.
+// What an object nothing holds needs of the bake (docs/method.md "Free motion"): its six rigid
+// modes, to keep the basis free of them; supports that take them out of equations; the best rigid
+// fit of a pose to rest; the inertia sums of the moving frame.
 #ifndef EP_BAKE_INERTIA_H
 #define EP_BAKE_INERTIA_H
 

@@ -42,11 +42,11 @@ typedef struct ep_model_memory {
   int count;
 } ep_model_memory;
 
-// Fills every array of reduced/model_arrays.h. Descriptors (DESIGN "T = L^T U"): T = L^T M3 U with
-// the plain volume mass M, L = Phi kron I3, c0 = L^T M3 X, so that c(q) = c0 + T q. An object with
-// fixed vertices gets the constant function 1/sqrt(V) as function 0 (size.m = m + 1): without
-// it a mean displacement would not be seen. With regions: T = L^T M_R U of each, one after another
-// (Zhao et al. 2018, sec. 5), with the constant function where the region is held
+// Fills every array of reduced/model_arrays.h. Descriptors (docs/method.md "Descriptors"): T = L^T
+// M3 U with the plain volume mass M, L = Phi kron I3, c0 = L^T M3 X, so that c(q) = c0 + T q. An
+// object with fixed vertices gets the constant function 1/sqrt(V) as function 0 (size.m = m + 1):
+// without it a mean displacement would not be seen. With regions: T = L^T M_R U of each, one after
+// another (Zhao et al. 2018, sec. 5), with the constant function where the region is held
 // (ep_region_carried). Example i: q_i of the basis, c0 + T q_i, and at each cubature element F_i^-1
 // and w |det F_i| (reduced/reference.h: nothing where the example flattens it). Errors:
 // EP_ERR_ARGUMENT (sizes, element numbers, weights), EP_ERR_NUMERIC (numbers that do not fit the

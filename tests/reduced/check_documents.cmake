@@ -1,0 +1,42 @@
+cmake_policy(VERSION 3.22)
+# Documents that comments cite: each docs/NAME.md is there, and so is each section cited by name,
+# as in  docs/method.md "Free motion", "Contact". No other document is cited.
+file(GLOB_RECURSE sources ${SOURCE}/align/*.[ch] ${SOURCE}/app/*.[ch] ${SOURCE}/base/*.[ch]
+     ${SOURCE}/cubature/*.[ch] ${SOURCE}/examples/*.[ch] ${SOURCE}/lbspace/*.[ch]
+     ${SOURCE}/linalg/*.[ch] ${SOURCE}/mesh/*.[ch] ${SOURCE}/reduced/*.[ch]
+     ${SOURCE}/results/*.[ch] ${SOURCE}/tests/*.[ch])
+set(failed "")
+set(sections 0)
+foreach(file ${sources})
+  file(READ ${file} text)
+  if(NOT text MATCHES "\\.md")
+    continue()
+  endif()
+  string(REGEX REPLACE "\n *// *" " " text "${text}") # a citation may go on in the next line
+  string(REGEX MATCHALL "[A-Za-z0-9_/-]+\\.md( \"[A-Za-z0-9 -]+\")?(, \"[A-Za-z0-9 -]+\")*" cited
+         "${text}")
+  foreach(citation ${cited})
+    string(REGEX MATCH "^[^ ,]+" document "${citation}")
+    if(NOT EXISTS ${SOURCE}/${document})
+      list(APPEND failed "${file}: there is no ${document}")
+      continue()
+    endif()
+    file(READ ${SOURCE}/${document} content)
+    string(REGEX MATCHALL "\"[^\"]+\"" names "${citation}")
+    foreach(name ${names})
+      string(REPLACE "\"" "" name ${name})
+      string(FIND "${content}" "\n## ${name}\n" at)
+      math(EXPR sections "${sections} + 1")
+      if(at LESS 0)
+        list(APPEND failed "${file}: ${document} has no section \"${name}\"")
+      endif()
+    endforeach()
+  endforeach()
+endforeach()
+if(sections LESS 10)
+  list(APPEND failed "found only ${sections} cited sections: is this test still looking?")
+endif()
+if(failed)
+  list(JOIN failed "\n" text)
+  message(FATAL_ERROR "${text}")
+endif()
