@@ -173,6 +173,7 @@ random_scene draw_scene(uint64_t seed, double wild) {
   direction(rng, s.axis);
   s.angle = chance(rng, 0.5) ? between(rng, -180, 180) : 0;
   s.formats = chance(rng, 0.2) ? ep_random_below(rng, 8) : 0;
+  s.guards = chance(rng, 0.15); // most of a bake's time: few scenes look for them
   return s;
 }
 
@@ -416,6 +417,7 @@ static void write_reduction(writer *w) {
   put(w, '{', "path_samples: %d", s->path_samples);
   put(w, '{', "elements: %d", s->elements);
   if (s->cubic) put(w, '{', "evaluator: cubic");
+  if (!s->guards) fputs(", guards: 0", w->file);
   end(w, '}');
 }
 

@@ -52,7 +52,7 @@ typedef struct random_scene {
   int families;
   random_family family[FAMILIES_MOST];
   bool cubic, narrow;
-  int eigenfunctions, modes, linear_modes, path_samples, elements, training;
+  int eigenfunctions, modes, linear_modes, path_samples, elements, training, guards;
   ep_integrator integrator;
   double dt, damping_mass, damping_stiffness;
   int steps;
