@@ -6,6 +6,7 @@
 #include "app/compare/compare_charts.h"
 #include "app/report.h"
 #include "base/escape.h"
+#include "results/page.h"
 
 // ---- tables ------------------------------------------------------------------------------------
 
@@ -30,12 +31,6 @@ static ep_status write_csv(const char *path, const ep_comparison *c, ep_error *e
   return ep_output_commit(&out, err);
 }
 
-static void cell(FILE *out, const char *format, double value) {
-  fputs("<td>", out);
-  if (isfinite(value)) fprintf(out, format, value);
-  fputs("</td>", out);
-}
-
 static void html_row(FILE *out, const ep_comparison *c, const ep_point *p, bool best) {
   char name[96];
   ep_compare_line_name(c, p, name, sizeof name);
@@ -51,45 +46,36 @@ static void html_row(FILE *out, const ep_comparison *c, const ep_point *p, bool 
     fputs("</td></tr>\n", out);
     return;
   }
-  cell(out, "%.1f", p->step_median_us);
-  cell(out, "%.1f", p->step_min_us);
-  cell(out, "%.1f", p->target_median_us);
-  cell(out, "%.2f", p->newton_per_step);
-  cell(out, "%.2f", p->offline_s);
-  cell(out, "%.1f", p->memory_bytes / 1024);
-  cell(out, "%.2e", p->position_error);
-  cell(out, "%.2e", p->velocity_error);
-  cell(out, "%.2e", p->energy_error);
-  cell(out, "%.2e", p->force_error);
-  if (c->examples) cell(out, "%.2e", p->weight_error);
-  cell(out, "%.0f", p->inverted);
-  cell(out, "%.0f", p->halvings);
+  ep_page_cell(out, "%.1f", p->step_median_us);
+  ep_page_cell(out, "%.1f", p->step_min_us);
+  ep_page_cell(out, "%.1f", p->target_median_us);
+  ep_page_cell(out, "%.2f", p->newton_per_step);
+  ep_page_cell(out, "%.2f", p->offline_s);
+  ep_page_cell(out, "%.1f", p->memory_bytes / 1024);
+  ep_page_cell(out, "%.2e", p->position_error);
+  ep_page_cell(out, "%.2e", p->velocity_error);
+  ep_page_cell(out, "%.2e", p->energy_error);
+  ep_page_cell(out, "%.2e", p->force_error);
+  if (c->examples) ep_page_cell(out, "%.2e", p->weight_error);
+  ep_page_cell(out, "%.0f", p->inverted);
+  ep_page_cell(out, "%.0f", p->halvings);
   fputs("</tr>\n", out);
 }
 
+// What the shared look does not have.
 static const char STYLE[] =
-    "body{font:15px/1.5 system-ui,sans-serif;color:#1d2430;background:#fff;max-width:1360px;"
-    "margin:2rem auto;padding:0 1rem}h1{font-size:1.5rem;margin:0 0 .2rem}h2{font-size:1.1rem;"
-    "margin:2rem 0 .5rem}p{margin:.4rem 0;max-width:60rem}svg{max-width:100%;height:auto}"
-    ".scroll{overflow-x:auto}table{border-collapse:collapse;font-size:13px;"
-    "font-variant-numeric:tabular-nums}th,td{padding:.22rem .34rem;border-bottom:1px solid #dde2e7;"
-    "text-align:right;white-space:nowrap}th:first-child{text-align:left;font-weight:500}"
-    "thead th{white-space:normal;vertical-align:bottom;border-bottom:2px solid "
-    "#8a93a0;font-weight:600}tr.best{background:#e8f4ec}"
-    "td.failed{color:#a11;text-align:left;white-space:normal}.note{color:#566070}"
+    "svg{max-width:100%;height:auto}thead th{white-space:normal;vertical-align:bottom}"
+    "tr.best{background:#e8f4ec}td.failed{text-align:left;white-space:normal}"
     ".pick{background:#e8f4ec;border-left:4px solid #218c54;padding:.6rem .9rem}";
 
 static void html_head(FILE *out, const ep_comparison *c) {
-  fputs("<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-        "content=\"width=device-width, initial-scale=1\"><title>",
-        out);
-  ep_write_escaped(out, c->name);
-  fprintf(out, ": methods compared</title><style>%s</style></head><body>\n<h1>", STYLE);
-  ep_write_escaped(out, c->name);
+  char title[256];
   const ep_sweep *s = &c->scene->sweep;
+  snprintf(title, sizeof title, "%.200s: methods compared", c->name);
+  ep_page_begin(out, title, STYLE);
   fprintf(out,
-          ": methods compared</h1>\n<p class=\"note\">%d vertices, %d tets, %d examples; %g s "
-          "simulated, %s. Errors are against %s at dt = %.4g s.</p>\n",
+          "<p class=\"note\">%d vertices, %d tets, %d examples; %g s simulated, %s. Errors are "
+          "against %s at dt = %.4g s.</p>\n",
           c->vertices, c->tets, c->examples, c->frames * c->frame_interval,
           ep_integrator_name(c->scene->integrator),
           s->reference == EP_METHOD_FULL ? "the full space"
@@ -158,16 +144,25 @@ static void html_advice(FILE *out, const ep_comparison *c) {
 static void html_table(FILE *out, const ep_comparison *c) {
   char why[256];
   const int best = ep_compare_recommend(c, why);
-  static const char *const heads[] = {
-      "method", "r",           "step, median [us]", "min [us]", "interpolation [us]",
-      "Newton", "offline [s]", "memory [KiB]",      "position", "velocity",
-      "energy", "force",       "weights",           "inverted", "halved"};
-  fputs("<h2>All settings</h2>\n<div class=\"scroll\"><table><thead><tr>", out);
-  for (size_t i = 0; i < sizeof heads / sizeof *heads; i++)
-    if (c->examples || strcmp(heads[i], "weights") != 0) fprintf(out, "<th>%s</th>", heads[i]);
-  fputs("</tr></thead><tbody>\n", out);
+  const char *const heads[] = {"method",
+                               "r",
+                               "step, median [us]",
+                               "min [us]",
+                               "interpolation [us]",
+                               "Newton",
+                               "offline [s]",
+                               "memory [KiB]",
+                               "position",
+                               "velocity",
+                               "energy",
+                               "force",
+                               c->examples ? "weights" : NULL,
+                               "inverted",
+                               "halved"};
+  fputs("<h2>All settings</h2>\n", out);
+  ep_page_table(out, sizeof heads / sizeof *heads, heads);
   for (int i = 0; i < c->count; i++) html_row(out, c, &c->point[i], i == best);
-  fputs("</tbody></table></div>\n", out);
+  ep_page_table_end(out);
 }
 
 static void html_notes(FILE *out) {
@@ -187,8 +182,9 @@ static void html_notes(FILE *out) {
       "an example's weight from the reference's.</p>\n<p>Every path of the examples has a "
       "reference of its own: the full space with the forces of that path.</p>\n<p "
       "class=\"note\">The numbers of the first chart are in results.csv, of those over time in "
-      "frames.csv; everything in results.json.</p>\n</body></html>\n",
+      "frames.csv; everything in results.json.</p>\n",
       out);
+  ep_page_end(out);
 }
 
 static ep_status html_chart(FILE *out, const char *heading, const ep_chart *chart, ep_error *err) {

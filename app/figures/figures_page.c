@@ -6,30 +6,21 @@
 #include "app/report.h"
 #include "base/escape.h"
 #include "base/files.h"
+#include "results/page.h"
 
+// What the shared look does not have.
 static const char STYLE[] =
-    "body{font:15px/1.5 system-ui,sans-serif;color:#1d2430;background:#fff;max-width:1400px;"
-    "margin:2rem auto;padding:0 1rem}h1{font-size:1.6rem;margin:0 0 .3rem}h2{font-size:1.25rem;"
+    "body{max-width:1400px}h1{font-size:1.6rem;margin:0 0 .3rem}h2{font-size:1.25rem;"
     "margin:3rem 0 .3rem;border-top:2px solid #dde2e7;padding-top:1rem}h3{font-size:1rem;"
-    "margin:0 0 .3rem;font-weight:600}p{margin:.4rem 0;max-width:62rem}"
+    "margin:0 0 .3rem;font-weight:600}p{max-width:62rem}"
     ".runs{display:grid;grid-template-columns:repeat(auto-fit,minmax(520px,1fr));gap:1.2rem;"
     "margin:.8rem 0}.run{border:1px solid #dde2e7;border-radius:6px;padding:.7rem;min-width:0}"
     ".run img{width:100%;display:block;border-radius:4px}.finals{display:grid;gap:.6rem;"
     "grid-template-columns:repeat(auto-fill,minmax(280px,1fr))}.finals figure{margin:0}"
     ".finals img{width:100%;border-radius:4px}figcaption{font-size:13px;color:#566070}"
-    ".scroll{overflow-x:auto}table{border-collapse:collapse;font-size:13px;"
-    "font-variant-numeric:tabular-nums}th,td{padding:.22rem .5rem;border-bottom:1px solid #dde2e7;"
-    "text-align:right;white-space:nowrap}th:first-child{text-align:left;font-weight:500}"
-    "thead th{border-bottom:2px solid #8a93a0;font-weight:600}tr.paper{background:#f6f1e4}"
+    "th,td{padding:.22rem .5rem}tr.paper{background:#f6f1e4}"
     "details{font-size:13px;margin:.5rem 0 0}summary{cursor:pointer;color:#345a8a}"
-    "details ul{margin:.3rem 0;padding-left:1.2rem}.out{color:#566070}"
-    ".failed{color:#a11}.good{color:#1e7d4d}.note{color:#566070;font-size:13px}";
-
-static void cell(FILE *out, const char *format, double value) {
-  fputs("<td>", out);
-  if (isfinite(value)) fprintf(out, format, value);
-  fputs("</td>", out);
-}
+    "details ul{margin:.3rem 0;padding-left:1.2rem}.out{color:#566070}.note{font-size:13px}";
 
 // ---- pictures ----------------------------------------------------------------------------------
 
@@ -113,20 +104,20 @@ static void run_row(FILE *out, const ep_figure_run *run) {
     return;
   }
   const double steps = ep_json_get_number(s, "steps_done"), m = ep_json_get_number(s, "m");
-  cell(out, "%.0f", ep_json_get_number(s, "vertices"));
-  cell(out, "%.0f", ep_json_get_number(s, "tets"));
-  cell(out, "%.0f", ep_json_get_number(s, "examples"));
-  cell(out, "%.0f", m > 0 ? m : NAN);
-  cell(out, "%.0f", ep_json_get_number(s, "r"));
-  cell(out, "%.0f", ep_json_get_number(s, "s"));
-  cell(out, "%.3f", ep_json_get_number(s, "t_interp_ms"));
-  cell(out, "%.3f", ep_json_get_number(s, "t_step_ms"));
-  cell(out, "%.4g", 1e3 * ep_json_get_number(s, "dt"));
-  cell(out, "%.2f", steps > 0 ? ep_json_get_number(s, "newton_iterations") / steps : NAN);
-  cell(out, "%.1f", 100 * ep_json_get_number(s, "example_fraction_most"));
-  cell(out, "%.1f", 100 * ep_json_get_number(s, "example_fraction"));
-  cell(out, "%.2f", 100 * ep_json_get_number(contact, "penetration_share"));
-  cell(out, "%.0f", ep_json_get_number(s, "inverted_tets"));
+  ep_page_cell(out, "%.0f", ep_json_get_number(s, "vertices"));
+  ep_page_cell(out, "%.0f", ep_json_get_number(s, "tets"));
+  ep_page_cell(out, "%.0f", ep_json_get_number(s, "examples"));
+  ep_page_cell(out, "%.0f", m > 0 ? m : NAN);
+  ep_page_cell(out, "%.0f", ep_json_get_number(s, "r"));
+  ep_page_cell(out, "%.0f", ep_json_get_number(s, "s"));
+  ep_page_cell(out, "%.3f", ep_json_get_number(s, "t_interp_ms"));
+  ep_page_cell(out, "%.3f", ep_json_get_number(s, "t_step_ms"));
+  ep_page_cell(out, "%.4g", 1e3 * ep_json_get_number(s, "dt"));
+  ep_page_cell(out, "%.2f", steps > 0 ? ep_json_get_number(s, "newton_iterations") / steps : NAN);
+  ep_page_cell(out, "%.1f", 100 * ep_json_get_number(s, "example_fraction_most"));
+  ep_page_cell(out, "%.1f", 100 * ep_json_get_number(s, "example_fraction"));
+  ep_page_cell(out, "%.2f", 100 * ep_json_get_number(contact, "penetration_share"));
+  ep_page_cell(out, "%.0f", ep_json_get_number(s, "inverted_tets"));
   fputs("</tr>\n", out);
 }
 
@@ -150,17 +141,17 @@ static void full_row(FILE *out, const ep_figure_run *run) {
     fprintf(out, " (the reduced run stays within %.2g %% of the diagonal)",
             100 * ep_json_get_number(reduced, "position_error"));
   fputs("</th>", out);
-  cell(out, "%.0f", ep_json_get_number(run->full, "vertices"));
-  cell(out, "%.0f", ep_json_get_number(run->full, "tets"));
-  cell(out, "%.0f", ep_json_get_number(run->full, "examples"));
+  ep_page_cell(out, "%.0f", ep_json_get_number(run->full, "vertices"));
+  ep_page_cell(out, "%.0f", ep_json_get_number(run->full, "tets"));
+  ep_page_cell(out, "%.0f", ep_json_get_number(run->full, "examples"));
   fputs("<td></td><td></td><td></td>", out);
   const double interpolation = ep_json_get_number(full, "target_median_us");
-  cell(out, "%.3g", 1e-3 * interpolation);
-  cell(out, "%.4g", 1e-3 * ep_json_get_number(full, "step_median_us"));
-  cell(out, "%.4g", 1e3 * ep_json_get_number(full, "dt"));
-  cell(out, "%.2f", ep_json_get_number(full, "newton_per_step"));
+  ep_page_cell(out, "%.3g", 1e-3 * interpolation);
+  ep_page_cell(out, "%.4g", 1e-3 * ep_json_get_number(full, "step_median_us"));
+  ep_page_cell(out, "%.4g", 1e3 * ep_json_get_number(full, "dt"));
+  ep_page_cell(out, "%.2f", ep_json_get_number(full, "newton_per_step"));
   fputs("<td></td><td></td><td></td>", out);
-  cell(out, "%.0f", ep_json_get_number(full, "inverted"));
+  ep_page_cell(out, "%.0f", ep_json_get_number(full, "inverted"));
   fputs("</tr>\n", out);
 }
 
@@ -168,14 +159,14 @@ static void paper_row(FILE *out, const ep_figure_paper *p) {
   fputs("<tr class=\"paper\"><th>paper: ", out);
   ep_write_escaped(out, p->model);
   fputs("</th>", out);
-  cell(out, "%.0f", p->vertices);
-  cell(out, "%.0f", p->tets);
-  cell(out, "%.0f", p->examples);
-  cell(out, "%.0f", p->m);
-  cell(out, "%.0f", p->r);
-  cell(out, "%.0f", p->s);
-  cell(out, "%.3g", p->t_interp);
-  cell(out, "%.4g", p->t_total);
+  ep_page_cell(out, "%.0f", p->vertices);
+  ep_page_cell(out, "%.0f", p->tets);
+  ep_page_cell(out, "%.0f", p->examples);
+  ep_page_cell(out, "%.0f", p->m);
+  ep_page_cell(out, "%.0f", p->r);
+  ep_page_cell(out, "%.0f", p->s);
+  ep_page_cell(out, "%.3g", p->t_interp);
+  ep_page_cell(out, "%.4g", p->t_total);
   fputs("<td></td><td></td><td></td><td></td><td></td><td></td></tr>\n", out);
 }
 
@@ -184,15 +175,13 @@ static void table(FILE *out, const ep_figure *figure) {
       "",           "vertices",        "tets",         "examples", "m",      "r",
       "s",          "t_interp [ms]",   "t_total [ms]", "dt [ms]",  "Newton", "example, most [%]",
       "at end [%]", "penetration [%]", "inverted"};
-  fputs("<div class=\"scroll\"><table><thead><tr>", out);
-  for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) fprintf(out, "<th>%s</th>", heads[i]);
-  fputs("</tr></thead><tbody>\n", out);
+  ep_page_table(out, sizeof heads / sizeof *heads, heads);
   for (int i = 0; i < figure->nruns; i++) {
     run_row(out, &figure->run[i]);
     if (figure->run[i].full) full_row(out, &figure->run[i]);
   }
   for (int i = 0; i < figure->npapers; i++) paper_row(out, &figure->paper[i]);
-  fputs("</tbody></table></div>\n", out);
+  ep_page_table_end(out);
   if (!figure->note) return;
   fputs("<p class=\"note\">", out);
   ep_write_escaped(out, figure->note);
@@ -202,13 +191,8 @@ static void table(FILE *out, const ep_figure *figure) {
 // ---- page --------------------------------------------------------------------------------------
 
 static void head(FILE *out, const ep_figures *all) {
-  fputs("<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-        "content=\"width=device-width, initial-scale=1\"><title>",
-        out);
-  ep_write_escaped(out, all->title);
-  fprintf(out, "</title><style>%s</style></head><body>\n<h1>", STYLE);
-  ep_write_escaped(out, all->title);
-  fputs("</h1>\n<p>", out);
+  ep_page_begin(out, all->title, STYLE);
+  fputs("<p>", out);
   if (all->text) ep_write_escaped(out, all->text);
   fprintf(out, "</p>\n<p class=\"%s\">%d of %d runs done.</p>\n", all->failed ? "failed" : "good",
           all->runs - all->failed, all->runs);
@@ -241,6 +225,6 @@ ep_status ep_figures_write(const char *root, const ep_figures *figures, ep_error
   EP_TRY(ep_output_open(&out, path, err));
   head(out.file, figures);
   for (int i = 0; i < figures->count; i++) one_figure(out.file, &figures->figure[i]);
-  fputs("</body></html>\n", out.file);
+  ep_page_end(out.file);
   return ep_output_commit(&out, err);
 }

@@ -8,6 +8,7 @@
 #include "app/report.h"
 #include "app/stress/stress.h"
 #include "base/escape.h"
+#include "results/page.h"
 
 // ---- sums over an axis -------------------------------------------------------------------------
 
@@ -137,16 +138,15 @@ static void csv(FILE *out, const ep_stress_report *report) {
   }
 }
 
-static const char head[] =
-    "<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport "
-    "content='width=device-width'><title>Stress</title><style>"
-    "body{font:15px/1.45 system-ui,sans-serif;margin:2rem auto;max-width:1100px;padding:0 1rem;"
-    "color:#222}table{border-collapse:collapse;margin:.6rem 0 1.6rem}"
-    "td,th{padding:.25rem .6rem;text-align:right;border:1px solid #fff}"
-    "th{font-weight:600;background:#f2f2f4}td.l,th.l{text-align:left}"
+// What the shared look does not have.
+static const char STYLE[] =
+    "body{max-width:1100px}h1{font-size:2rem}h2{font-size:1.5rem;margin:1.3rem 0 "
+    ".8rem}p{max-width:none}table{font-size:15px;margin:.6rem 0 1.6rem}"
+    "th,td{padding:.25rem .6rem;border:1px solid #fff;white-space:normal}"
+    "th,th:first-child{font-weight:600;background:#f2f2f4}"
     ".safe{background:#d9efdc}.subdivided{background:#fdf3c7}.inverted{background:#fbdcb2}"
     ".growth{background:#f6c7b5}.refused{background:#e3d3ea}.broken{background:#d33;color:#fff}"
-    ".key span{padding:.15rem .6rem;margin-right:.4rem}small{color:#666}</style>";
+    ".key span{padding:.15rem .6rem;margin-right:.4rem}small{color:#666}";
 
 static void cell(FILE *out, const ep_stress_result *r, const char *text) {
   fprintf(out, "<td class=%s title='", ep_stress_outcome_name(r->outcome));
@@ -179,11 +179,11 @@ static void grid(FILE *out, const ep_stress_report *report) {
   }
   if (rows == 0) return;
   fprintf(out, "<h2>Stiffness against time step</h2><p>Median of Newton iterations a step.</p>"
-               "<table><tr><th class=l>Young's modulus &times;</th>");
+               "<table><tr><th>Young's modulus &times;</th>");
   for (int b = 0; b < columns; b++) fprintf(out, "<th>%.3g s</th>", dt[b]);
   fprintf(out, "</tr>");
   for (int a = 0; a < rows; a++) {
-    fprintf(out, "<tr><th class=l>%g</th>", value[a]);
+    fprintf(out, "<tr><th>%g</th>", value[a]);
     for (int b = 0; b < columns; b++) {
       const ep_stress_result *r = grid_result(report, value[a], dt[b]);
       char text[32] = "";
@@ -222,7 +222,7 @@ static void axis_table(FILE *out, const ep_stress_report *report, ep_stress_axis
   fprintf(out, "<h2>%s</h2><table>", titles[axis]);
   for (int v = 0; v < EP_VARIANTS; v++) {
     if (!in_row(report, v, axis)) continue;
-    fprintf(out, "<tr><th class=l>%s</th>", ep_stress_variant_name((ep_stress_variant)v));
+    fprintf(out, "<tr><th>%s</th>", ep_stress_variant_name((ep_stress_variant)v));
     for (int i = 0; i < report->count; i++) {
       const ep_stress_result *r = &report->result[i];
       if (r->what.axis != axis || (int)r->what.variant != v || r->what.second > 0) continue;
@@ -238,11 +238,11 @@ static void axis_table(FILE *out, const ep_stress_report *report, ep_stress_axis
 }
 
 static void page(FILE *out, const ep_stress_report *report) {
-  fputs(head, out);
-  fprintf(out, "<h1>Stress: ");
-  ep_write_escaped(out, report->name);
+  char title[256];
+  snprintf(title, sizeof title, "Stress: %.200s", report->name);
+  ep_page_begin(out, title, STYLE);
   fprintf(out,
-          "</h1><p>%d cases in %.0f s: 60 steps with the scene's loads, 60 (from start states 300) "
+          "<p>%d cases in %.0f s: 60 steps with the scene's loads, 60 (from start states 300) "
           "without loads and "
           "example force. In a cell: the value, the median of Newton iterations a step, inverted "
           "tets at "
@@ -254,7 +254,7 @@ static void page(FILE *out, const ep_stress_report *report) {
   fprintf(out, "</p>");
   grid(out, report);
   for (int a = 0; a < EP_STRESS_AXES; a++) axis_table(out, report, (ep_stress_axis)a);
-  fprintf(out, "</html>\n");
+  ep_page_end(out);
 }
 
 static ep_status write_text(const char *folder, const char *name, const ep_stress_report *report,
