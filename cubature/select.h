@@ -1,5 +1,5 @@
-// Choosing elements: greedy growth (An, Kim, James 2008, with all candidates
-// and in Gram form), pruning by the optimal brain surgeon (Hassibi and Stork 1993), and exchange of both.
+// Choosing elements: greedy growth (An, Kim, James 2008, with all candidates and in Gram form),
+// pruning by the optimal brain surgeon (Hassibi and Stork 1993), and exchange of both.
 #ifndef EP_CUBATURE_SELECT_H
 #define EP_CUBATURE_SELECT_H
 
