@@ -140,8 +140,8 @@ static void csv(FILE *out, const ep_stress_report *report) {
 
 // What the shared look does not have.
 static const char STYLE[] =
-    "body{max-width:1100px}h1{font-size:2rem}h2{font-size:1.5rem;margin:1.3rem 0 "
-    ".8rem}p{max-width:none}table{font-size:15px;margin:.6rem 0 1.6rem}"
+    "body{max-width:1100px}h1{font-size:2rem}h2{font-size:1.5rem;margin:1.3rem 0 .8rem}"
+    "p{max-width:none}table{font-size:15px;margin:.6rem 0 1.6rem}"
     "th,td{padding:.25rem .6rem;border:1px solid #fff;white-space:normal}"
     "th,th:first-child{font-weight:600;background:#f2f2f4}"
     ".safe{background:#d9efdc}.subdivided{background:#fdf3c7}.inverted{background:#fbdcb2}"
