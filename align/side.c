@@ -4,6 +4,7 @@
 
 #include "align/private.h"
 #include "linalg/dense.h"
+#include "mesh/topology.h"
 
 // Regions are blurred over this share of V^(1/3), so that their edges pull on what is near.
 static const double REGION_BLUR = 0.1;
@@ -30,23 +31,10 @@ static ep_status no_memory(const ep_side *side, ep_error *err) {
                  side->n);
 }
 
-static int root(int *parent, int i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
-
 int ep_components(const ep_mesh *mesh) {
   int *parent = malloc(((size_t)mesh->nv + 1) * sizeof *parent);
   if (!parent) return -1;
-  int parts = mesh->nv;
-  for (int i = 0; i < mesh->nv; i++) parent[i] = i;
-  for (int e = 0; e < mesh->nt; e++)
-    for (int c = 1; c < 4; c++) {
-      const int a = root(parent, mesh->tet[4 * e]), b = root(parent, mesh->tet[4 * e + c]);
-      if (a == b) continue;
-      parent[a > b ? a : b] = a > b ? b : a;
-      parts--;
-    }
+  const int parts = ep_mesh_join_tets(mesh, parent);
   free(parent);
   return parts;
 }
