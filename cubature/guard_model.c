@@ -176,7 +176,10 @@ ep_status ep_guard_model_begin(ep_guard_model *m, ep_error *err) {
 
 static bool step(ep_guard_model *m, ep_step_def *def, double dt, int level) {
   def->dt = dt;
-  if (ep_step(m->state, def, NULL) == EP_OK) return true;
+  ep_step_report report;
+  const ep_status status = ep_step(m->state, def, &report);
+  m->evaluations += report.newton_iterations + report.line_search_steps;
+  if (status == EP_OK) return true;
   return level < HALVINGS && step(m, def, dt / 2, level + 1) && step(m, def, dt / 2, level + 1);
 }
 

@@ -22,7 +22,8 @@ typedef struct ep_guard_model {
   double *ratio;   // (nt) J of all elements when last looked at
   void *block;     // of the state
   ep_state *state;
-  double dt; // [s] a part of the longest period
+  double dt;        // [s] a part of the longest period
+  long evaluations; // of the energy, in all steps so far
 } ep_guard_model;
 
 // Errors: EP_ERR_MEMORY, EP_ERR_NUMERIC (K0), those of ep_model_build.

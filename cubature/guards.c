@@ -16,7 +16,7 @@ enum { ROUNDS = 40 };            // of one push, with the guards it asked for
 enum { STREAM_PUSHES = 201, STREAM_HELD_OUT };
 
 ep_guard_options ep_default_guard_options(void) {
-  return (ep_guard_options){.most = 256, .pushes = 8, .seed = 1};
+  return (ep_guard_options){.most = 256, .pushes = 8, .effort = 60000, .seed = 1};
 }
 
 void ep_guards_free(ep_guards *guards) {
@@ -34,7 +34,9 @@ typedef struct chooser {
   double *u;             // (3 nv) scratch
   double *force, *start; // (r) of the push at hand
   int *root, *worst;     // (nv) clusters: union-find over vertices, element with the least J
-  bool full;
+  bool full, tired;
+  ep_log *log;
+  int done; // pushes
 } chooser;
 
 // ---- pushes ------------------------------------------------------------------------------------
@@ -167,6 +169,8 @@ static ep_status run(chooser *c, bool stop, outcome *out, ep_error *err) {
 static ep_status secure(chooser *c, ep_error *err) {
   outcome now;
   for (int round = 0; round < ROUNDS; round++) {
+    c->tired = c->model.evaluations > c->options->effort;
+    if (c->tired) return EP_OK;
     EP_TRY(run(c, true, &now, err));
     if (now.left <= 0 || add_worst(c) == 0) return EP_OK;
   }
@@ -175,26 +179,34 @@ static ep_status secure(chooser *c, ep_error *err) {
 
 // ---- all of them -------------------------------------------------------------------------------
 
+// Pushes of every severity that only test.
+static int held_out(const ep_guard_options *options) {
+  return (options->pushes + 3) / 4;
+}
+
 static ep_status push_all(chooser *c, ep_error *err) {
   c->rng = ep_random_seed(c->options->seed, STREAM_PUSHES);
   for (int hard = 0; hard < SEVERITIES; hard++)
-    for (int i = 0; i < c->options->pushes && !c->full; i++) {
+    for (int i = 0; i < c->options->pushes && !c->full && !c->tired; i++) {
       if (i % 6 == 5)
         draw_start(c);
       else
         draw_push(c, severity[hard]);
       EP_TRY(secure(c, err));
+      ep_progress(c->log, ++c->done);
     }
   return EP_OK;
 }
 
 static ep_status hold_out(chooser *c, ep_guards *out, ep_error *err) {
   outcome now;
+  const long effort = c->model.evaluations + c->options->effort / 4;
   c->rng = ep_random_seed(c->options->seed, STREAM_HELD_OUT);
   for (int hard = 0; hard < SEVERITIES; hard++)
-    for (int i = 0; i < (c->options->pushes + 3) / 4; i++) {
+    for (int i = 0; i < held_out(c->options) && c->model.evaluations <= effort; i++) {
       draw_push(c, severity[hard]);
       EP_TRY(run(c, false, &now, err));
+      ep_progress(c->log, ++c->done);
       out->tried++;
       out->left += now.left > 0;
       out->most = out->most > now.during ? out->most : now.during;
@@ -217,6 +229,7 @@ static ep_status keep(chooser *c, ep_guards *out, ep_error *err) {
     return ep_fail(err, EP_ERR_MEMORY, "no memory for %zu guards", count);
   out->count = (int)count;
   out->full = c->full;
+  out->tired = c->tired;
   memcpy(out->tet, m->tet, count * sizeof *out->tet);
   qsort(out->tet, count, sizeof *out->tet, by_number); // neighbours share a group in a step
   for (size_t i = 0; i < count; i++) {
@@ -252,9 +265,9 @@ ep_status ep_guards_choose(const ep_fem *fem, const ep_basis *basis, const ep_cu
                            const ep_guard_options *options, ep_log *log, ep_guards *out,
                            ep_error *err) {
   *out = (ep_guards){0};
-  chooser c = {.options = options};
+  chooser c = {.options = options, .log = log};
   EP_TRY(ep_guard_model_create(fem, basis, cubature, options->most, &c.model, err));
-  ep_progress_begin(log, "guards", 0);
+  ep_progress_begin(log, "guards", SEVERITIES * (options->pushes + held_out(options)));
   const ep_status status = choose(&c, out, err);
   ep_progress_end(log);
   ep_guard_model_free(&c.model);

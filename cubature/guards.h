@@ -10,6 +10,7 @@
 typedef struct ep_guard_options {
   int most;      // guards at most
   int pushes;    // of every severity
+  long effort;   // evaluations of the energy after which no push is tried; a quarter more to test
   uint64_t seed; // pushes are drawn from it
 } ep_guard_options;
 ep_guard_options ep_default_guard_options(void);
@@ -21,6 +22,7 @@ typedef struct ep_guards {
   double *limit;         // (count) share of its volume below which it resists
   int spared;            // tets an example turns over itself: they are never guards
   bool full;             // more were wanted than `most`
+  bool tired;            // the effort was used up before all pushes were tried
   int tried, left, most; // held-out pushes, those that left tets inverted once let go, the most
                          // inverted at any time of them
 } ep_guards;

@@ -46,12 +46,16 @@ static void free_fixture(fixture *f) {
   free_bar(&f->b);
 }
 
-static ep_guards choose(const fixture *f, int most, uint64_t seed) {
+static ep_guards choose_within(const fixture *f, int most, uint64_t seed, long effort) {
   ep_guard_options o = ep_default_guard_options();
   ep_guards out;
-  o.most = most, o.seed = seed;
+  o.most = most, o.seed = seed, o.effort = effort;
   ASSERT_OK(ep_guards_choose(&f->b.fem, &f->basis, &f->cubature, &o, NULL, &out, err));
   return out;
+}
+
+static ep_guards choose(const fixture *f, int most, uint64_t seed) {
+  return choose_within(f, most, seed, ep_default_guard_options().effort);
 }
 
 static void test_repeatable_and_bounded(void **state) {
@@ -59,6 +63,7 @@ static void test_repeatable_and_bounded(void **state) {
   fixture f;
   make_fixture(&f, 0, 1);
   ep_guards a = choose(&f, 200, 3), b = choose(&f, 200, 3), few = choose(&f, 5, 3);
+  ep_guards brief = choose_within(&f, 200, 3, 500);
   assert_true(a.count > 5 && a.count <= 200);
   assert_int_equal(a.count, b.count);
   assert_memory_equal(a.tet, b.tet, (size_t)a.count * sizeof *a.tet);
@@ -69,11 +74,13 @@ static void test_repeatable_and_bounded(void **state) {
     assert_true(a.weight[i] > 0 && a.limit[i] > 0 && a.limit[i] < 0.5);
   }
   assert_int_equal(few.count, 5);
-  assert_true(few.full);
+  assert_true(few.full && !few.tired);
   assert_int_equal(a.spared, 0);
+  assert_true(brief.tired && !brief.full && brief.count < a.count);
   ep_guards_free(&a);
   ep_guards_free(&b);
   ep_guards_free(&few);
+  ep_guards_free(&brief);
   free_fixture(&f);
 }
 
