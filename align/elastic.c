@@ -18,7 +18,8 @@
 
 // Weight of a landmark; both bodies have volume 1.
 static const double LANDMARK = 0.05;
-enum { ROUNDS = 8, SOLVE_STEPS = 200 };
+// The last rounds stand still where others go on by momentum: the images end where the maps do.
+enum { SETTLE = 3, SOLVE_STEPS = 200 };
 // Relative residual of a solve: rounds repeat it with other data.
 static const double SOLVED = 1e-5;
 
@@ -27,7 +28,7 @@ typedef struct half {
   const ep_side *from, *to;
   double r[9], stiffness;
   double *target, *mark;     // (to->n x 3), (marks x 3) of `to` in from's frame
-  double *y;                 // (from->n x 3)
+  double *y, *last;          // (from->n x 3) now; as the last round solved for them
   ep_point_map *map;         // from -> to
   const ep_point_map *other; // to -> from
 } half;
@@ -46,7 +47,8 @@ static ep_status make_half(const ep_side *from, const ep_side *to, const double 
   h->target = malloc(3 * (size_t)to->n * sizeof *h->target);
   h->mark = malloc((3 * (size_t)to->marks + 1) * sizeof *h->mark);
   h->y = malloc(3 * (size_t)from->n * sizeof *h->y);
-  if (!h->target || !h->mark || !h->y)
+  h->last = malloc(3 * (size_t)from->n * sizeof *h->last);
+  if (!h->target || !h->mark || !h->y || !h->last)
     return ep_fail(err, EP_ERR_MEMORY, "no memory to refine a map of %d vertices", from->n);
   ep_frame_apply(to->n, r, to->x, h->target);
   ep_frame_apply(to->marks, r, to->mark_x, h->mark);
@@ -58,6 +60,7 @@ static void free_half(half *h) {
   free(h->target);
   free(h->mark);
   free(h->y);
+  free(h->last);
 }
 
 static ep_status make_solver(int n, solver *s, ep_error *err) {
@@ -194,11 +197,23 @@ static void solve(half *h, const solver *s) {
   }
 }
 
+// Move the images on by `momentum` of their way since the last round.
+static void move_on(half *h, double momentum) {
+  for (size_t i = 0; i < 3 * (size_t)h->from->n; i++) {
+    const double y = h->y[i];
+    if (momentum > 0) h->y[i] += momentum * (y - h->last[i]);
+    h->last[i] = y;
+  }
+}
+
 static ep_status refine(half *there, half *back, const ep_match_rule *rule, const solver *s,
                         ep_error *err) {
-  for (int round = 0; round < ROUNDS; round++) {
+  for (int round = 0; round < rule->rounds; round++) {
+    const double momentum = round > 0 && round < rule->rounds - SETTLE ? rule->momentum : 0;
     solve(there, s);
     solve(back, s);
+    move_on(there, momentum);
+    move_on(back, momentum);
     EP_TRY(ep_match_positions(there->from, there->to, there->r, rule, there->y, there->map, err));
     EP_TRY(ep_match_positions(back->from, back->to, back->r, rule, back->y, back->map, err));
   }

@@ -114,7 +114,9 @@ typedef struct ep_match_rule {
   double region_weight;     // weight of regions, 0 without
   double mark_weight;       // weight of landmarks, 0 without
   double skin_weight;       // weight of being on the boundary
-  double stiffness;         // of the elastic refinement, against distances (volumes 1)
+  double stiffness;         // of the elastic refinement, against distances (volumes 1);
+  int rounds;               // its rounds; each goes on by
+  double momentum;          // so much of the way of the one before, 0: none
   bool refine;              // p is a map already: the last level only, or those from
   int first;                // this number of functions on; 0: the last
   const unsigned char *use; // (regions) which take part, NULL: all
