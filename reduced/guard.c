@@ -117,8 +117,7 @@ double ep_guard_add(ep_state *state, const double *q, double *f, double *h, int 
 void ep_guard_begin(ep_state *state) {
   const ep_model *m = state->model;
   const int groups = groups_of(m);
-  int touched = 0;
-  int turned_over = 0;
+  int touched = 0, over = 0;
   if (groups > 0) memcpy(state->padded_q, state->q, (size_t)m->size.r * sizeof *state->q);
   for (int group = 0; group < groups; group++) {
     if (!to_be_evaluated(state, group)) continue;
@@ -126,8 +125,9 @@ void ep_guard_begin(ep_state *state) {
     for (int e = EP_LANES * group; e < m->size.guards && e < EP_LANES * (group + 1); e++) {
       double jacobian;
       way_of(state, e, &jacobian);
-      turned_over |= jacobian < 0;
+      over += jacobian < 0;
     }
   }
-  state->guards_soft = turned_over || (state->guards_soft && touched);
+  state->guards_over = over;
+  state->guards_soft = over > 0 || (state->guards_soft && touched);
 }

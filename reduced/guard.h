@@ -13,6 +13,8 @@
 // is above its limit: there both are zero, so the change back adds no energy; the change to
 // parabolas takes some away.
 //
+// Where the object jams all the same it unfolds: reduced/unfold.h.
+//
 // What is far from its limit is not looked at: of every group of 8 guards the state remembers where
 // it was looked at last, q_0, and how far F may go from there before any of the group can reach its
 // limit. |F - F_0| <= sum_a |q_a - q_0a| growth_a, and

@@ -9,6 +9,7 @@
 #include "reduced/guard.h"
 #include "reduced/kernel.h"
 #include "reduced/region.h"
+#include "reduced/unfold.h"
 
 // Arrays of a state: X(name, number of doubles). width = 8 ceil(r / 8), sets = ep_model_regions;
 // free = r where the object is free, else 0; n = r, or r + 6 unknowns where it is free.
@@ -110,6 +111,8 @@ struct ep_state {
   double strain_scale; // max_j |G_j|_F: strain by a unit q
   ep_contact contact;
   int guards_soft;  // parabolas in place of walls (reduced/guard.h)
+  int guards_over;  // guards with J < 0 at the beginning of the step
+  ep_unfold unfold; // the way out of a jam
   int has_target;   // a target was found before
   double dt_before; // of the last step; 0: none, or q or v was written since
   ep_frame frame;   // free motion: reduced/frame.h; at the end of the last step

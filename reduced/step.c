@@ -58,6 +58,12 @@ static double add_k0(const ep_step_run *s, double scale, const double *x, const 
 static double inner_energy(ep_step_run *s, const double *x, double *g, double *h, int project) {
   ep_state *state = s->state;
   const ep_step_def *def = s->def;
+  if (state->unfold.on) {
+    s->pull = s->strains = 0;
+    s->cancelling = s->elastic = ep_unfold_energy(state, x, g, h, project);
+    if (g) s->internal = sqrt(ep_dot(state->model->size.r, g, g));
+    return s->elastic;
+  }
   const int as_energy = s->examples && def->example_force == EP_EXAMPLE_ENERGY;
   const int by_cubature = ep_is_cubature(state->model->evaluator);
   const double kept = s->examples ? 1 - def->relief : 1;
@@ -104,7 +110,7 @@ static double moving_energy(ep_step_run *s, double sum, const double *x, double 
     sum += 0.5 * (inertia * ahead * ahead + drag * moved * moved) - force * x[a];
     if (g) g[a] += inertia * ahead + drag * moved - force;
   }
-  const int linear = s->examples && def->example_force == EP_EXAMPLE_LINEAR;
+  const int linear = s->examples && def->example_force == EP_EXAMPLE_LINEAR && !state->unfold.on;
   const double stiff = viscous + (linear ? def->strength : 0);
   for (int i = 0; h && stiff > 0 && i < r * r; i++) h[i] += stiff * state->model->k0[i];
   for (int a = 0; h && a < r; a++) h[(r + 1) * a] += inertia + drag;
@@ -338,6 +344,29 @@ static ep_status find_target(ep_step_run *s, ep_step_report *report) {
   return status;
 }
 
+// Does a load or the world act?
+static int is_loaded(const ep_step_run *s) {
+  const ep_step_def *def = s->def;
+  double sum = 0;
+  for (int i = 0; i < 3; i++) sum += fabs(def->gravity[i]);
+  for (int i = 0; i < def->pulls; i++)
+    for (int c = 0; c < 3; c++) sum += fabs(def->pull[i].force[c]);
+  for (int a = 0; def->force && a < s->state->model->size.r; a++) sum += fabs(def->force[a]);
+  return sum > 0 || s->contact || s->outer;
+}
+
+// Walls, parabolas, or the way out of a jam. Returns whether the state is calm (reduced/unfold.h).
+static int begin_guards(ep_step_run *s) {
+  ep_state *state = s->state;
+  ep_guard_begin(state);
+  if (!state->guards_soft && !state->unfold.on) return 0;
+  const int unfolds = state->unfold.on;
+  state->unfold.on = 0;
+  inner_energy(s, state->q, state->g, NULL, 0);
+  state->unfold.on = unfolds;
+  return ep_unfold_begin(state, s->elastic + s->strains, state->g, is_loaded(s));
+}
+
 ep_status ep_step(ep_state *state, const ep_step_def *given, ep_step_report *report) {
   ep_step_report unused;
   const ep_model_sizes *size = &state->model->size;
@@ -361,7 +390,7 @@ ep_status ep_step(ep_state *state, const ep_step_def *given, ep_step_report *rep
                       .max_iterations = def->max_iterations};
   ep_status status = find_target(&s, report);
   if (status != EP_OK) return status;
-  ep_guard_begin(state);
+  const int calm = begin_guards(&s);
   predict(&s);
   if (s.free && s.motion.sound) ep_free_freeze(&s.motion, state->q, NULL);
   if (s.contact) begin_contact(&s);
@@ -370,6 +399,7 @@ ep_status ep_step(ep_state *state, const ep_step_def *given, ep_step_report *rep
   set_report(&s, &newton, report);
   if (status != EP_OK) return status;
   finish(&s, &report->contact);
+  ep_unfold_end(state, calm);
   report->kinetic_energy =
       s.free ? ep_free_kinetic(state) : 0.5 * ep_dot(size->r, state->v, state->v);
   return EP_OK;
