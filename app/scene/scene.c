@@ -153,7 +153,7 @@ static ep_status read_output(const ep_scene_reader *r, const raw_output *raw, ep
   for (unsigned i = 0; raw && i < raw->moments_count; i++)
     EP_TRY(ep_read_number(r, "output.moments", &raw->moments[i], 0, 0, out->dt * (out->steps + 0.5),
                           &out->moment[out->nmoments++]));
-  if (!raw || !raw->formats) return EP_OK;
+  if (!raw || (!raw->formats && !ep_read_given(r, "output.formats"))) return EP_OK;
   out->formats = 0;
   for (unsigned i = 0; i < raw->formats_count; i++) out->formats |= (unsigned)raw->formats[i];
   return EP_OK;

@@ -36,6 +36,12 @@ static void place_of(const ep_scene_reader *r, const char *key, char *out, size_
     snprintf(out, size, " with --set: %.60s", key);
 }
 
+bool ep_read_given(const ep_scene_reader *r, const char *key) {
+  int line, column, own;
+  return (set_of(r, key, &own) && (size_t)own == strlen(key)) ||
+         ep_yaml_locate(&r->loaded->yaml, key, &line, &column);
+}
+
 ep_status ep_read_refuse(const ep_scene_reader *r, const char *key, const char *format, ...) {
   char text[512];
   va_list args;

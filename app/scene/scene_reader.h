@@ -19,6 +19,8 @@ typedef struct ep_scene_reader {
 ep_status ep_read_refuse(const ep_scene_reader *r, const char *key, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 ep_status ep_read_no_memory(const ep_scene_reader *r);
+// Whether the file or a --set gives the key: an empty list comes like one that is not there.
+bool ep_read_given(const ep_scene_reader *r, const char *key);
 
 // given NULL: the fallback. Refused outside low..high.
 ep_status ep_read_number(const ep_scene_reader *r, const char *key, const double *given,

@@ -51,6 +51,13 @@ static void defaults_are_filled_in(void **state) {
   assert_int_equal(s.formats, EP_FORMAT_VTU | EP_FORMAT_GLB | EP_FORMAT_PNG);
   assert_int_equal(s.nfixed + s.nfamilies + s.nloads, 0);
   ep_scene_free(&s);
+  assert_int_equal(parse_with(HEAD "output: {formats: []}\n", 0, NULL, &s, &err), EP_OK);
+  assert_int_equal(s.formats, 0);
+  ep_scene_free(&s);
+  const char *const sets[] = {"output.formats=[]"};
+  assert_int_equal(parse_with(HEAD, 1, sets, &s, &err), EP_OK);
+  assert_int_equal(s.formats, 0);
+  ep_scene_free(&s);
 }
 
 static void green_strain_keys(void **state) {
