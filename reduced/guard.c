@@ -12,20 +12,6 @@ static int groups_of(const ep_model *m) {
   return (m->size.guards + EP_LANES - 1) / EP_LANES;
 }
 
-// F of one guard (state->padded_q holds q and zeros).
-static void guard_gradient(const ep_state *state, int e, double f[9]) {
-  const int blocks = state->model->size.blocks;
-  const double *g = state->model->guard_g + (size_t)e * (size_t)blocks * 72;
-  for (int c = 0; c < 9; c++) {
-    double sum[EP_LANES] = {0};
-    for (int b = 0; b < blocks; b++)
-      for (int i = 0; i < EP_LANES; i++)
-        sum[i] += g[(9 * b + c) * EP_LANES + i] * state->padded_q[EP_LANES * b + i];
-    f[c] = (c % 4 == 0) +
-           (((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7])));
-  }
-}
-
 // How far F may go (Frobenius) before its determinant can be `room` smaller: a lower bound, from
 // d -> room / (c1 + c2 d + c3 d^2), which swaps the sides of the root.
 static double way_to(const double f[9], const double cof[9], double room) {
@@ -40,7 +26,7 @@ static double way_to(const double f[9], const double cof[9], double room) {
 // Way of one guard to its limit; <= 0 where it is there, or F is not finite. *jacobian: J.
 static double way_of(const ep_state *state, int e, double *jacobian) {
   double f[9], cof[9];
-  guard_gradient(state, e, f);
+  ep_packed_gradient(state, state->model->guard_g, e, f);
   for (int i = 0; i < 3; i++) {
     const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
     for (int j = 0; j < 3; j++) {

@@ -158,6 +158,9 @@ double ep_green_share(const ep_model *model, const ep_green *green);
 double ep_green_add(ep_state *state, const ep_green *green, double strength, const double *q,
                     double *f, double *h);
 
+// F (9, by rows) of element e of packed gradients (reduced/pack.c), of the q in padded_q.
+void ep_packed_gradient(const ep_state *state, const double *packed, int e, double f[9]);
+
 // Terms of the example force with the targets as they are frozen, from `term` on: one for each
 // region with strength. Returns how many terms there are then.
 int ep_force_terms(ep_state *state, const ep_step_def *def, int terms);
