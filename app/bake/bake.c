@@ -73,6 +73,17 @@ void ep_bake_end(ep_bake_step *step) {
   step->stage->seconds = ep_seconds() - step->started;
 }
 
+ep_status ep_bake_stage(ep_bake *bake, ep_stage *stage, ep_bake_taker *take, ep_bake_maker *compute,
+                        ep_error *err) {
+  ep_bake_step step;
+  ep_status status = EP_OK;
+  ep_bake_begin(bake, stage, &step);
+  if (step.found && !take(bake, &step)) ep_bake_reject(bake, &step);
+  if (!step.found) status = compute(bake, &step, err);
+  ep_bake_end(&step);
+  return ep_bake_status(stage, status, err);
+}
+
 bool ep_bake_take(const ep_bake_step *step, const char *name, size_t count, double **out) {
   const double *found = ep_artifact_array(&step->artifact, name, EP_F64, count);
   *out = found ? malloc((count + 1) * sizeof **out) : NULL;

@@ -95,6 +95,11 @@ void ep_bake_reject(ep_bake *bake, ep_bake_step *step);
 // To be called before computing, after what the stage builds on is there: starts PETSc once.
 ep_status ep_bake_compute(ep_bake *bake, ep_bake_step *step, ep_error *err);
 void ep_bake_end(ep_bake_step *step);
+// A whole stage: what take finds in the cache, else what compute makes and stores.
+typedef bool ep_bake_taker(ep_bake *bake, const ep_bake_step *step);
+typedef ep_status ep_bake_maker(ep_bake *bake, ep_bake_step *step, ep_error *err);
+ep_status ep_bake_stage(ep_bake *bake, ep_stage *stage, ep_bake_taker *take, ep_bake_maker *compute,
+                        ep_error *err);
 // The status of a stage as it goes up: a failure names the stage it happened in, and only that one.
 ep_status ep_bake_status(const ep_stage *stage, ep_status status, ep_error *err);
 // Copy count doubles or ints out of the artifact into new memory; false where they are not there.

@@ -12,10 +12,6 @@ static size_t unknowns(const ep_bake *bake) {
   return 3 * (size_t)bake->shapes->shape[0].mesh.nv;
 }
 
-static ep_status failed(ep_status status, const ep_stage *stage, ep_error *err) {
-  return ep_bake_status(stage, status, err);
-}
-
 ep_status ep_bake_fem(ep_bake *bake, ep_error *err) {
   if (bake->fem.mesh) return EP_OK;
   const ep_shapes *s = bake->shapes;
@@ -57,16 +53,15 @@ static ep_status compute_modes(ep_bake *bake, ep_bake_step *step, ep_error *err)
 ep_status ep_bake_modes(ep_bake *bake, ep_error *err) {
   if (bake->modes.mode) return EP_OK;
   ep_stage *stage = ep_plan_find(bake->plan, EP_STAGE_MODES);
-  ep_bake_step step;
-  ep_status status = EP_OK;
-  ep_bake_begin(bake, stage, &step);
-  if (step.found && !take_modes(bake, &step)) ep_bake_reject(bake, &step);
-  if (!step.found) status = compute_modes(bake, &step, err);
-  ep_bake_end(&step);
-  return failed(status, stage, err);
+  return ep_bake_stage(bake, stage, take_modes, compute_modes, err);
 }
 
 // ---- paths -----------------------------------------------------------------------------------
+
+static bool take_paths(ep_bake *bake, const ep_bake_step *step) {
+  const size_t count = (size_t)bake->shapes->examples * (size_t)bake->scene->path_samples;
+  return ep_bake_take(step, "x", count * unknowns(bake), &bake->paths);
+}
 
 static ep_status compute_paths(ep_bake *bake, ep_bake_step *step, ep_error *err) {
   const size_t n3 = unknowns(bake), samples = (size_t)bake->scene->path_samples;
@@ -93,15 +88,7 @@ static ep_status compute_paths(ep_bake *bake, ep_bake_step *step, ep_error *err)
 ep_status ep_bake_paths(ep_bake *bake, ep_error *err) {
   ep_stage *stage = ep_plan_find(bake->plan, EP_STAGE_PATHS);
   if (bake->paths || !stage->runs) return EP_OK;
-  const size_t count = (size_t)bake->shapes->examples * (size_t)bake->scene->path_samples;
-  ep_bake_step step;
-  ep_status status = EP_OK;
-  ep_bake_begin(bake, stage, &step);
-  if (step.found && !ep_bake_take(&step, "x", count * unknowns(bake), &bake->paths))
-    ep_bake_reject(bake, &step);
-  if (!step.found) status = compute_paths(bake, &step, err);
-  ep_bake_end(&step);
-  return failed(status, stage, err);
+  return ep_bake_stage(bake, stage, take_paths, compute_paths, err);
 }
 
 // ---- basis -----------------------------------------------------------------------------------
@@ -150,13 +137,7 @@ static ep_status compute_basis(ep_bake *bake, ep_bake_step *step, ep_error *err)
 ep_status ep_bake_basis(ep_bake *bake, ep_error *err) {
   if (bake->basis.u) return EP_OK;
   ep_stage *stage = ep_plan_find(bake->plan, EP_STAGE_BASIS);
-  ep_bake_step step;
-  ep_status status = EP_OK;
-  ep_bake_begin(bake, stage, &step);
-  if (step.found && !take_basis(bake, &step)) ep_bake_reject(bake, &step);
-  if (!step.found) status = compute_basis(bake, &step, err);
-  ep_bake_end(&step);
-  return failed(status, stage, err);
+  return ep_bake_stage(bake, stage, take_basis, compute_basis, err);
 }
 
 // ---- cubature --------------------------------------------------------------------------------
@@ -249,13 +230,7 @@ static ep_status compute_cubature(ep_bake *bake, ep_bake_step *step, ep_error *e
 ep_status ep_bake_cubature(ep_bake *bake, ep_error *err) {
   ep_stage *stage = ep_plan_find(bake->plan, EP_STAGE_CUBATURE);
   if (bake->cubature.tet || !stage->runs) return EP_OK;
-  ep_bake_step step;
-  ep_status status = EP_OK;
-  ep_bake_begin(bake, stage, &step);
-  if (step.found && !take_cubature(bake, &step)) ep_bake_reject(bake, &step);
-  if (!step.found) status = compute_cubature(bake, &step, err);
-  ep_bake_end(&step);
-  return failed(status, stage, err);
+  return ep_bake_stage(bake, stage, take_cubature, compute_cubature, err);
 }
 
 // ---- regions ---------------------------------------------------------------------------------
@@ -352,5 +327,5 @@ ep_status ep_bake_model(ep_bake *bake, char *path, ep_error *err) {
   }
   stage->seconds = ep_seconds() - started;
   if (status == EP_OK) settle(bake->plan);
-  return failed(status, stage, err);
+  return ep_bake_status(stage, status, err);
 }

@@ -23,15 +23,12 @@ static ep_status compute(ep_bake *bake, ep_bake_step *step, ep_error *err) {
                         err);
 }
 
+static bool take(ep_bake *bake, const ep_bake_step *step) {
+  return ep_bake_take(step, "w", ep_cubic_count(bake->scene->modes), &bake->cubic);
+}
+
 ep_status ep_bake_cubic(ep_bake *bake, ep_error *err) {
   ep_stage *stage = ep_plan_find(bake->plan, EP_STAGE_CUBIC);
   if (bake->cubic || !stage->runs) return EP_OK;
-  ep_bake_step step;
-  ep_status status = EP_OK;
-  ep_bake_begin(bake, stage, &step);
-  if (step.found && !ep_bake_take(&step, "w", ep_cubic_count(bake->scene->modes), &bake->cubic))
-    ep_bake_reject(bake, &step);
-  if (!step.found) status = compute(bake, &step, err);
-  ep_bake_end(&step);
-  return ep_bake_status(stage, status, err);
+  return ep_bake_stage(bake, stage, take, compute, err);
 }

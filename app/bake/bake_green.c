@@ -80,11 +80,5 @@ static bool take(ep_bake *bake, const ep_bake_step *step) {
 ep_status ep_bake_green(ep_bake *bake, ep_error *err) {
   ep_stage *stage = ep_plan_find(bake->plan, EP_STAGE_GREEN);
   if (bake->green.b || !stage->runs) return EP_OK;
-  ep_bake_step step;
-  ep_status status = EP_OK;
-  ep_bake_begin(bake, stage, &step);
-  if (step.found && !take(bake, &step)) ep_bake_reject(bake, &step);
-  if (!step.found) status = compute(bake, &step, err);
-  ep_bake_end(&step);
-  return ep_bake_status(stage, status, err);
+  return ep_bake_stage(bake, stage, take, compute, err);
 }

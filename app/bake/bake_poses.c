@@ -419,12 +419,6 @@ static ep_status fit_free(ep_bake *bake, ep_error *err) {
 ep_status ep_bake_poses(ep_bake *bake, ep_error *err) {
   ep_stage *stage = ep_plan_find(bake->plan, EP_STAGE_POSES);
   if (bake->poses || !stage->runs) return EP_OK;
-  ep_bake_step step;
-  ep_status status = EP_OK;
-  ep_bake_begin(bake, stage, &step);
-  if (step.found && !take_poses(bake, &step)) ep_bake_reject(bake, &step);
-  if (!step.found) status = compute_poses(bake, &step, err);
-  ep_bake_end(&step);
-  if (status == EP_OK && !bake->shapes->nfixed) status = fit_free(bake, err);
-  return ep_bake_status(stage, status, err);
+  EP_TRY(ep_bake_stage(bake, stage, take_poses, compute_poses, err));
+  return bake->shapes->nfixed ? EP_OK : ep_bake_status(stage, fit_free(bake, err), err);
 }
