@@ -26,42 +26,82 @@ static int frame_rows(const ep_scene *scene, const ep_record *record, int *row) 
   return count;
 }
 
-static ep_status write_frame(const char *path, const ep_mesh *mesh, const ep_model *model,
-                             const ep_record *record, int row, double *x, double *u,
-                             ep_error *err) {
-  ep_record_positions(model, record, row, x);
-  for (size_t i = 0; i < 3 * (size_t)mesh->nv; i++) u[i] = x[i] - mesh->x[i];
-  const ep_field field = {"displacement", 3, u};
-  return ep_mesh_write_vtu(path, mesh, x, 1, &field, 0, NULL, err);
+// Files frames/STEM-0000.vtu .. of rows of the record, and the .pvd that gives them their times.
+typedef struct series {
+  const char *stem, *index; // "frames/frame", "animation.pvd"
+  const ep_record *record;
+  int frames;
+  const int *row; // (frames)
+  ep_status (*write)(void *user, const char *path, int row, ep_error *err);
+  void *user;
+  ep_log *log; // NULL: no progress is shown
+} series;
+
+// What an earlier, longer run left there would be taken for frames of this one.
+static ep_status remove_later(const char *folder, const series *s, ep_error *err) {
+  char name[PATH_SHORT], path[EP_PATH_MAX];
+  for (int i = s->frames;; i++) {
+    snprintf(name, sizeof name, "%s-%04d.vtu", s->stem, i);
+    EP_TRY(ep_path_join(folder, name, path, err));
+    if (remove(path) != 0) return EP_OK;
+  }
+}
+
+static ep_status write_series(const char *folder, const series *s, ep_error *err) {
+  const size_t count = (size_t)s->frames;
+  char path[EP_PATH_MAX];
+  char(*name)[PATH_SHORT] = calloc(count, sizeof *name);
+  const char **names = calloc(count, sizeof *names);
+  double *time = calloc(count, sizeof *time);
+  ep_status status = name && names && time ? EP_OK : no_memory(err);
+  for (int i = 0; i < s->frames && status == EP_OK; i++) {
+    snprintf(name[i], sizeof name[i], "%s-%04d.vtu", s->stem, i);
+    names[i] = name[i];
+    time[i] = s->record->time[s->row[i]];
+    status = ep_path_join(folder, name[i], path, err);
+    if (status == EP_OK) status = s->write(s->user, path, s->row[i], err);
+    if (s->log) ep_progress(s->log, i + 1);
+  }
+  if (status == EP_OK) status = remove_later(folder, s, err);
+  if (status == EP_OK) status = ep_path_join(folder, s->index, path, err);
+  if (status == EP_OK) status = ep_mesh_write_pvd(path, s->frames, time, names, err);
+  free(name);
+  free(names);
+  free(time);
+  return status;
+}
+
+typedef struct object_frames {
+  const ep_mesh *mesh;
+  const ep_model *model;
+  const ep_record *record;
+  double *x, *u; // (3 nv) scratch
+} object_frames;
+
+static ep_status write_frame(void *user, const char *path, int row, ep_error *err) {
+  const object_frames *o = user;
+  ep_record_positions(o->model, o->record, row, o->x);
+  for (size_t i = 0; i < 3 * (size_t)o->mesh->nv; i++) o->u[i] = o->x[i] - o->mesh->x[i];
+  const ep_field field = {"displacement", 3, o->u};
+  return ep_mesh_write_vtu(path, o->mesh, o->x, 1, &field, 0, NULL, err);
 }
 
 static ep_status write_vtu(const char *folder, const ep_mesh *mesh, const ep_model *model,
                            const ep_record *record, int frames, const int *row, ep_log *log,
                            ep_error *err) {
-  const size_t count = (size_t)frames;
   char path[EP_PATH_MAX];
-  char(*name)[PATH_SHORT] = calloc(count, sizeof *name);
-  const char **names = calloc(count, sizeof *names);
-  double *time = calloc(count, sizeof *time), *x = calloc(6 * (size_t)mesh->nv, sizeof *x);
-  ep_status status = name && names && time && x ? EP_OK : no_memory(err);
+  double *x = malloc(6 * (size_t)mesh->nv * sizeof *x);
+  ep_status status = x ? EP_OK : no_memory(err);
   if (status == EP_OK) status = ep_path_join(folder, "frames", path, err);
   if (status == EP_OK) status = ep_make_folders(path, err);
-  ep_progress_begin(log, "frames", frames);
-  for (int i = 0; i < frames && status == EP_OK; i++) {
-    snprintf(name[i], sizeof name[i], "frames/frame-%04d.vtu", i);
-    names[i] = name[i];
-    time[i] = record->time[row[i]];
-    status = ep_path_join(folder, name[i], path, err);
-    if (status == EP_OK)
-      status = write_frame(path, mesh, model, record, row[i], x, x + 3 * (size_t)mesh->nv, err);
-    ep_progress(log, i + 1);
+  if (status == EP_OK) {
+    object_frames user = {mesh, model, record, x, x + 3 * (size_t)mesh->nv};
+    const series s = {"frames/frame", "animation.pvd", record, frames, row,
+                      write_frame,    &user,           log};
+    ep_progress_begin(log, "frames", frames);
+    status = write_series(folder, &s, err);
+    ep_progress_end(log);
   }
-  ep_progress_end(log);
-  if (status == EP_OK) status = ep_path_join(folder, "animation.pvd", path, err);
-  if (status == EP_OK) status = ep_mesh_write_pvd(path, frames, time, names, err);
-  free(name);
-  free(names);
-  free(time);
   free(x);
   return status;
 }
@@ -93,29 +133,28 @@ static ep_status make_solids(const ep_scene *scene, const ep_mesh *mesh, const e
   return ep_solids_make(scene, low, high, out, err);
 }
 
-// frames/obstacles-0000.vtu .. and obstacles.pvd.
+typedef struct obstacle_frames {
+  const ep_scene *scene;
+  const ep_solids *solids;
+  const ep_record *record;
+  double *x; // (3 nv of the solids) scratch
+} obstacle_frames;
+
+static ep_status write_obstacle_frame(void *user, const char *path, int row, ep_error *err) {
+  const obstacle_frames *o = user;
+  ep_solids_place(o->scene, o->solids, o->record->time[row], o->x);
+  return ep_mesh_write_vtu(path, &o->solids->mesh, o->x, 0, NULL, 0, NULL, err);
+}
+
 static ep_status write_obstacles_vtu(const char *folder, const ep_scene *scene,
                                      const ep_solids *solids, const ep_record *record, int frames,
                                      const int *row, ep_error *err) {
-  const size_t count = (size_t)frames;
-  char path[EP_PATH_MAX];
-  char(*name)[PATH_SHORT] = calloc(count, sizeof *name);
-  const char **names = calloc(count, sizeof *names);
-  double *time = calloc(count, sizeof *time), *x = calloc(3 * (size_t)solids->mesh.nv, sizeof *x);
-  ep_status status = name && names && time && x ? EP_OK : no_memory(err);
-  for (int i = 0; i < frames && status == EP_OK; i++) {
-    snprintf(name[i], sizeof name[i], "frames/obstacles-%04d.vtu", i);
-    names[i] = name[i];
-    time[i] = record->time[row[i]];
-    ep_solids_place(scene, solids, time[i], x);
-    status = ep_path_join(folder, name[i], path, err);
-    if (status == EP_OK) status = ep_mesh_write_vtu(path, &solids->mesh, x, 0, NULL, 0, NULL, err);
-  }
-  if (status == EP_OK) status = ep_path_join(folder, "obstacles.pvd", path, err);
-  if (status == EP_OK) status = ep_mesh_write_pvd(path, frames, time, names, err);
-  free(name);
-  free(names);
-  free(time);
+  double *x = malloc(3 * (size_t)solids->mesh.nv * sizeof *x);
+  if (!x) return no_memory(err);
+  obstacle_frames user = {scene, solids, record, x};
+  const series s = {"frames/obstacles",   "obstacles.pvd", record, frames, row,
+                    write_obstacle_frame, &user,           NULL};
+  const ep_status status = write_series(folder, &s, err);
   free(x);
   return status;
 }

@@ -73,6 +73,9 @@ static void a_scene_runs_end_to_end(void **state) {
   assert_true(cached(root, "model"));
   const double without = number(root, "example_fraction");
   json_decref(root);
+  json_decref(run_scene("cache-a", "--set simulation.steps=40")); // takes the later frames away
+  assert_true(ep_path_exists("results/frames/frame-0004.vtu"));
+  assert_false(ep_path_exists("results/frames/frame-0005.vtu"));
   if (!(with > 1.5 * without && without > 0)) fail_msg("with %g, without %g", with, without);
 }
 
