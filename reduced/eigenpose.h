@@ -125,7 +125,8 @@ double ep_elastic_energy(ep_state *state, const double *q, double *f, double *k,
 
 // Energy of deforming the examples, weighted by w (k), into configuration q:
 //   sum_i w_i sum_j w_j v_ij psi(F_j(q) F_ij^-1)   (Zhao et al. 2018 eq. 4 and 6; docs/method.md
-// "Shape interpolation"; v_ij: |det F_ij|, less where squeezed, reduced/reference.h), gradient f and Hessian h as in ep_elastic_energy.
+// "Shape interpolation"; v_ij: |det F_ij|, less where squeezed, reduced/reference.h), gradient f
+// and Hessian h as in ep_elastic_energy.
 double ep_example_energy(ep_state *state, const double *w, const double *q, double *f, double *h,
                          int project);
 
@@ -263,6 +264,8 @@ typedef struct ep_step_report {
   double elastic_energy, example_energy, kinetic_energy;
   ep_contact_report contact;
   double green_energy; // of the Green-strain potential: alpha W_a (negative), or its mixed form
+  int unfolding; // 1: the object was jammed turned over and unfolds: elastic_energy is that of
+                 // the unfolding, examples did not act (docs/green-strain.md)
 } ep_step_report;
 
 // One implicit step: weights and target from the state's q, then the minimum of the incremental

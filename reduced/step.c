@@ -315,6 +315,7 @@ static void set_report(const ep_step_run *s, const ep_newton *newton, ep_step_re
   report->elastic_energy = s->elastic;
   report->example_energy = s->pull;
   report->green_energy = s->strains;
+  report->unfolding = s->state->unfold.on;
 }
 
 // Pulls of a held object are in its `force`.
@@ -390,6 +391,7 @@ ep_status ep_step(ep_state *state, const ep_step_def *given, ep_step_report *rep
                       .max_iterations = def->max_iterations};
   ep_status status = find_target(&s, report);
   if (status != EP_OK) return status;
+  const ep_unfold before = state->unfold;
   const int calm = begin_guards(&s);
   predict(&s);
   if (s.free && s.motion.sound) ep_free_freeze(&s.motion, state->q, NULL);
@@ -397,7 +399,10 @@ ep_status ep_step(ep_state *state, const ep_step_def *given, ep_step_report *rep
   choose_start(&s);
   status = minimise(&s, &newton);
   set_report(&s, &newton, report);
-  if (status != EP_OK) return status;
+  if (status != EP_OK) {
+    state->unfold = before;
+    return status;
+  }
   finish(&s, &report->contact);
   ep_unfold_end(state, calm);
   report->kinetic_energy =

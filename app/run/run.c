@@ -113,6 +113,7 @@ static void add_timing(json_t *report, const ep_record *record) {
   json_object_set_new(report, "newton_iterations", json_integer(record->newton_iterations));
   json_object_set_new(report, "target_evaluations", json_integer(record->target_evaluations));
   json_object_set_new(report, "halved_steps", json_integer(record->halvings));
+  json_object_set_new(report, "unfolded_steps", json_integer(record->unfolded));
 }
 
 static json_t *contact_of(const ep_model *model, const ep_record *record) {
@@ -185,6 +186,11 @@ static ep_status report_run(const ep_cli *cli, ep_session *session, const ep_mod
             "up to %d tets are inside out after a step: weaken the loads, raise "
             "reduction.elements, or see with 'eigenpose check' whether the material is in SI units",
             record->max_inverted);
+  if (record->unfolded)
+    ep_warn(&session->log,
+            "the object was jammed turned over and unfolded in %d steps, without its material and "
+            "examples: weaken the loads or take a milder start",
+            record->unfolded);
   json_t *report = make_report(session, model, record, folder);
   if (!report) return ep_fail(err, EP_ERR_MEMORY, "no memory for the report");
   ep_status status = ep_outputs_summary(folder, report, err);

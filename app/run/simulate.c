@@ -94,6 +94,7 @@ static ep_status note(simulation *s, const ep_mesh *mesh, double *x) {
 static void add_up(ep_record *record, const ep_advance *done) {
   record->newton_iterations += done->newton_iterations;
   record->halvings += done->halvings;
+  record->unfolded += done->unfolding > 0;
   record->target_evaluations += (int)done->evaluations;
   record->deepest = fmax(record->deepest, done->deepest);
   if (done->touching > record->most_touching) record->most_touching = done->touching;

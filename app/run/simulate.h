@@ -25,6 +25,7 @@ typedef struct ep_record {
   double *momentum;      // (rows x 6) of a free object: linear, angular about the centre of mass
   int max_inverted;      // most inverted tets after any step
   int halvings;          // steps that had to be halved
+  int unfolded;          // steps in which a jammed object unfolded (reduced/unfold.h)
   int newton_iterations, target_evaluations; // over the run
   int most_touching;                         // vertices at the end of any step
   double deepest;                            // penetration at the end of any step [m]

@@ -192,6 +192,7 @@ static void add_step(const ep_step_report *report, ep_status status, ep_advance 
   if (status != EP_OK) return;
   const ep_contact_report *contact = &report->contact;
   out->last = *report;
+  out->unfolding += report->unfolding;
   out->deepest = fmax(out->deepest, contact->deepest);
   if (contact->touching > out->touching) out->touching = contact->touching;
 }

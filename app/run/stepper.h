@@ -24,6 +24,7 @@ typedef struct ep_advance {
   double deepest;      // of its contact: over all steps
   int touching;        // the most
   int newton_iterations, line_search_steps, projections, halvings;
+  int unfolding;         // steps in which a jammed object unfolded
   long evaluations;      // of the interpolation
   double seconds;        // wall time, interpolation included
   double target_seconds; // of the interpolation alone

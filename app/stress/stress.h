@@ -82,7 +82,7 @@ typedef struct ep_stress_result {
   double newton_median;   // iterations a step
   int newton_most;
   long line_search, projections;
-  int halvings, inverted_start, inverted_most, inverted_end;
+  int halvings, unfolded, inverted_start, inverted_most, inverted_end;
   double growth;  // largest (E' - E) / max E of a step of implicit Euler without loads and example
                   // force; NAN where it is not measured
   double step_us; // median

@@ -51,17 +51,19 @@ void ep_stress_text(FILE *out, const ep_stress_report *report) {
 static json_t *case_json(const ep_stress_result *r) {
   char value[32];
   ep_stress_value_text(&r->what, value);
-  return json_pack(
-      "{s:s, s:s, s:s, s:f, s:f, s:s, s:s, s:i, s:i, s:o, s:i, s:I, s:I, s:i, s:i, s:i, s:i, s:o, "
-      "s:o}",
-      "variant", ep_stress_variant_name(r->what.variant), "axis", ep_stress_axis_name(r->what.axis),
-      "text", value, "value", r->what.value, "second", r->what.second, "outcome",
-      ep_stress_outcome_name(r->outcome), "why", r->why, "steps", r->steps, "failed_step",
-      r->failed_step, "newton_median", ep_json_number(r->newton_median), "newton_most",
-      r->newton_most, "line_search_steps", (json_int_t)r->line_search, "projections",
-      (json_int_t)r->projections, "halved_steps", r->halvings, "inverted_start", r->inverted_start,
-      "inverted_most", r->inverted_most, "inverted_end", r->inverted_end, "energy_growth",
-      ep_json_number(r->growth), "step_us", ep_json_number(r->step_us));
+  return json_pack("{s:s, s:s, s:s, s:f, s:f, s:s, s:s, s:i, s:i, s:o, s:i, s:I, s:I, s:i, s:i, "
+                   "s:i, s:i, s:i, s:o, "
+                   "s:o}",
+                   "variant", ep_stress_variant_name(r->what.variant), "axis",
+                   ep_stress_axis_name(r->what.axis), "text", value, "value", r->what.value,
+                   "second", r->what.second, "outcome", ep_stress_outcome_name(r->outcome), "why",
+                   r->why, "steps", r->steps, "failed_step", r->failed_step, "newton_median",
+                   ep_json_number(r->newton_median), "newton_most", r->newton_most,
+                   "line_search_steps", (json_int_t)r->line_search, "projections",
+                   (json_int_t)r->projections, "halved_steps", r->halvings, "unfolded_steps",
+                   r->unfolded, "inverted_start", r->inverted_start, "inverted_most",
+                   r->inverted_most, "inverted_end", r->inverted_end, "energy_growth",
+                   ep_json_number(r->growth), "step_us", ep_json_number(r->step_us));
 }
 
 json_t *ep_stress_json(const ep_stress_report *report) {
@@ -125,16 +127,18 @@ static ep_status write_failures(const char *folder, const ep_stress_report *repo
 // ---- table and page ----------------------------------------------------------------------------
 
 static void csv(FILE *out, const ep_stress_report *report) {
-  fprintf(out, "case,variant,axis,value,dt,outcome,steps,newton_median,newton_most,"
-               "line_search_steps,projections,halved_steps,inverted_start,inverted_most,"
-               "inverted_end,energy_growth,step_us\n");
+  fprintf(out,
+          "case,variant,axis,value,dt,outcome,steps,newton_median,newton_most,"
+          "line_search_steps,projections,halved_steps,unfolded_steps,inverted_start,inverted_most,"
+          "inverted_end,energy_growth,step_us\n");
   for (int i = 0; i < report->count; i++) {
     const ep_stress_result *r = &report->result[i];
-    fprintf(out, "%d,%s,%s,%.10g,%.10g,%s,%d,%g,%d,%ld,%ld,%d,%d,%d,%d,%g,%.4g\n", i + 1,
+    fprintf(out, "%d,%s,%s,%.10g,%.10g,%s,%d,%g,%d,%ld,%ld,%d,%d,%d,%d,%d,%g,%.4g\n", i + 1,
             ep_stress_variant_name(r->what.variant), ep_stress_axis_name(r->what.axis),
             r->what.value, r->what.second, ep_stress_outcome_name(r->outcome), r->steps,
             r->newton_median, r->newton_most, r->line_search, r->projections, r->halvings,
-            r->inverted_start, r->inverted_most, r->inverted_end, r->growth, r->step_us);
+            r->unfolded, r->inverted_start, r->inverted_most, r->inverted_end, r->growth,
+            r->step_us);
   }
 }
 

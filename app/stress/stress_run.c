@@ -81,6 +81,7 @@ static void take(run *w, int step, const ep_advance *done) {
   out->line_search += done->line_search_steps;
   out->projections += done->projections;
   out->halvings += done->halvings;
+  out->unfolded += done->unfolding > 0;
   const ep_step_report *last = &done->last;
   const double energy =
       last->elastic_energy + last->green_energy + last->kinetic_energy + last->contact.energy;

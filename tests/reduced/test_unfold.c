@@ -3,7 +3,8 @@
 // Hessian is positive semidefinite; where unfolding begins V = W, or V = y < W, and V falls with y;
 // what is nowhere near turned over never unfolds, nor does what a load holds pressed flat; a bar
 // whose guards are mostly turned over unfolds, comes to rest with nothing inverted and back to its
-// own material, and its energy grows in no step (implicit Euler without loads: only round-off).
+// own material, and its energy grows in no step (implicit Euler without loads: only round-off); a
+// step that fails leaves the unfolding as it was.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -125,7 +126,7 @@ static story follow(const bar *b, const double *start, const double *load, int s
     most = fmax(most, energy);
     told.growth = fmax(told.growth, (energy - before) / most);
     before = energy;
-    told.unfolded += s->unfold.on;
+    told.unfolded += report.unfolding;
   }
   told.left = bar_inverted(b, ep_state_q(s));
   told.unfolds = s->unfold.on;
@@ -158,6 +159,32 @@ static void unfolds_and_returns(void **state) {
   bar_free(b);
 }
 
+// A step that fails leaves the unfolding as it was, begun or not.
+static void a_failed_step_changes_nothing(void **state) {
+  (void)state;
+  bar *b = make();
+  void *block;
+  ep_state *s = bar_state(b, &block);
+  ep_step_def whole = ep_default_step(), cut = whole;
+  ep_step_report report;
+  int failed[2] = {0, 0};
+  const double no_number[R] = {NAN};
+  cut.force = no_number;
+  mirrored(b, ep_state_q(s));
+  for (int i = 0; i < 20; i++) {
+    const ep_unfold before = s->unfold;
+    assert_int_equal(ep_step(s, &cut, &report), EP_ERR_NUMERIC);
+    assert_true(before.on == s->unfold.on && before.calm == s->unfold.calm);
+    assert_true(before.well == s->unfold.well && before.slope == s->unfold.slope);
+    failed[before.on]++;
+    assert_int_equal(ep_step(s, &whole, &report), EP_OK);
+    assert_int_equal(report.unfolding, s->unfold.on);
+  }
+  assert_true(failed[0] > 0 && failed[1] > 0);
+  free(block);
+  bar_free(b);
+}
+
 static void others_never_unfold(void **state) {
   (void)state;
   bar *b = make();
@@ -179,9 +206,8 @@ static void others_never_unfold(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(derivatives_are_right),
-      cmocka_unit_test(goes_on_from_the_energy),
-      cmocka_unit_test(unfolds_and_returns),
+      cmocka_unit_test(derivatives_are_right), cmocka_unit_test(goes_on_from_the_energy),
+      cmocka_unit_test(unfolds_and_returns),   cmocka_unit_test(a_failed_step_changes_nothing),
       cmocka_unit_test(others_never_unfold),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
