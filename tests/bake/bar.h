@@ -16,6 +16,7 @@
 #include "mesh/mesh.h"
 #include "reduced/bake/fem.h"
 #include "tests/near.h"
+#include "tests/norms.h"
 
 #define ASSERT_OK(call)                                                                            \
   do {                                                                                             \
@@ -103,18 +104,6 @@ static inline void smooth_random(const bar *b, uint64_t seed, double size, doubl
     }
   }
   for (size_t i = 0; i < b->n3; i++) u[i] *= size / largest;
-}
-
-static inline double norm_of(size_t n, const double *x) {
-  double sum = 0;
-  for (size_t i = 0; i < n; i++) sum += x[i] * x[i];
-  return sqrt(sum);
-}
-
-static inline double distance_of(size_t n, const double *x, const double *y) {
-  double sum = 0;
-  for (size_t i = 0; i < n; i++) sum += (x[i] - y[i]) * (x[i] - y[i]);
-  return sqrt(sum);
 }
 
 // The order p of an error ~ h^p from its values at h and h / 2.

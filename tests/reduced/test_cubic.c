@@ -81,8 +81,8 @@ static void equals_the_sum_over_elements(void **state) {
         const double e = ep_cubic_evaluate(&x.cubic, q, f, k, x.scratch);
         const double er = bar_reference(x.b, NULL, x.b->model.cubature_w, q, fr, kr, 0);
         assert_true(er > 0 && fabs(e - er) < tolerance * er);
-        assert_true(distance(r, f, fr) < tolerance * norm(r, fr));
-        assert_true(distance(r * r, k, kr) < tolerance * norm(r * r, kr));
+        assert_true(distance_of(r, f, fr) < tolerance * norm_of(r, fr));
+        assert_true(distance_of(r * r, k, kr) < tolerance * norm_of(r * r, kr));
         for (int a = 0; a < r; a++)
           for (int c = 0; c < a; c++) assert_true(k[a * r + c] == k[c * r + a]);
         assert_true(ep_cubic_evaluate(&x.cubic, q, NULL, NULL, x.scratch) == e);
@@ -116,7 +116,7 @@ static void derivatives_have_slope_two(void **state) {
           for (int l = 0; l < r; l++) fa[j] -= k[j * r + l] * d[l];
         }
         error[0][fine] += fabs(slope);
-        error[1][fine] += norm(r, fa);
+        error[1][fine] += norm_of(r, fa);
       }
     }
     for (int j = 0; j < 2; j++) assert_true(fabs(log10(error[j][0] / error[j][1]) - 2) < 0.1);
@@ -135,13 +135,13 @@ static void float_is_as_good_near_rest(void **state) {
     form x;
     make_form(r, EP_FLOAT, &x);
     assert_true(ep_cubic_evaluate(&x.cubic, q, f, NULL, x.scratch) == 0);
-    assert_true(norm(r, f) == 0);
+    assert_true(norm_of(r, f) == 0);
     for (double size = 1; size > 1e-9; size *= 0.1) {
       bar_random_q(x.b, size, q);
       const double e = ep_cubic_evaluate(&x.cubic, q, f, NULL, x.scratch);
       const double er = bar_reference(x.b, NULL, x.b->model.cubature_w, q, fr, NULL, 0);
       assert_true(fabs(e - er) < 2e-6 * er);
-      assert_true(distance(r, f, fr) < 2e-6 * norm(r, fr));
+      assert_true(distance_of(r, f, fr) < 2e-6 * norm_of(r, fr));
     }
     free_form(&x);
   }
@@ -203,8 +203,8 @@ static void batches_equal_single_states(void **state) {
       const double *fs = f + (size_t)s * n, *ks = k + (size_t)s * n * n;
       const double one = ep_cubic_evaluate(&x.cubic, q + (size_t)s * n, f1, k1, x.scratch);
       assert_true(fabs(e[s] - one) < tolerance * one);
-      assert_true(distance(r, fs, f1) < tolerance * norm(r, f1));
-      assert_true(distance(r * r, ks, k1) < tolerance * norm(r * r, k1));
+      assert_true(distance_of(r, fs, f1) < tolerance * norm_of(r, f1));
+      assert_true(distance_of(r * r, ks, k1) < tolerance * norm_of(r * r, k1));
     }
     ep_cubic_batch(&x.cubic, 5, q + 9 * n, e2, NULL, again, x.batch_scratch);
     assert_memory_equal(e2, e + 9, 5 * sizeof *e);

@@ -49,7 +49,7 @@ static void set_up_stiff(subject *x, ep_material material, int examples, double 
   memset(x->scales, 0, sizeof x->scales);
   for (int e = 0; e < x->b->model.size.s; e++) {
     const double norm_g =
-        norm(9 * R, x->b->g + 9 * (size_t)x->b->model.cubature_tet[e] * (size_t)R);
+        norm_of(9 * R, x->b->g + 9 * (size_t)x->b->model.cubature_tet[e] * (size_t)R);
     const double stiff = x->b->model.cubature_w[e] *
                          (x->b->model.cubature_lambda[e] + 2 * x->b->model.cubature_mu[e]);
     x->scales[0] = fmax(x->scales[0], norm_g);
@@ -90,8 +90,8 @@ static void energy_equals_all_elements(void **state) {
       double e = ep_elastic_energy(cubic, q, f, NULL, 0);
       assert_true(fabs(e - er) < 1e-12 * er);
       assert_true(e == ep_elastic_energy(cubic, q, NULL, k, 0)); // the kept result
-      assert_true(distance(R, f, fr) < 1e-12 * norm(R, fr));
-      assert_true(distance(R * R, k, kr) < 1e-12 * norm(R * R, kr));
+      assert_true(distance_of(R, f, fr) < 1e-12 * norm_of(R, fr));
+      assert_true(distance_of(R * R, k, kr) < 1e-12 * norm_of(R * R, kr));
       x.b->model.material = EP_STVK;
       penalised += fabs(ep_elastic_energy(all, q, NULL, NULL, 0) - er) > 1e-6 * er;
       x.b->model.material = material;
@@ -121,9 +121,9 @@ static void motions_agree_over_a_thousand_steps(void **state) {
   for (int step = 0; step < STEPS; step++) {
     def.force = step % 200 < 60 ? load : NULL;
     for (int i = 0; i < 3; i++) assert_int_equal(ep_step(run[i], &def, NULL), EP_OK);
-    largest = fmax(largest, norm(R, ep_state_q(run[0])));
+    largest = fmax(largest, norm_of(R, ep_state_q(run[0])));
     for (int i = 0; i < 2; i++)
-      worst[i] = fmax(worst[i], distance(R, ep_state_q(run[0]), ep_state_q(run[i + 1])));
+      worst[i] = fmax(worst[i], distance_of(R, ep_state_q(run[0]), ep_state_q(run[i + 1])));
   }
   assert_true(worst[0] < 1e-8 * largest);
   assert_true(worst[1] > 0 && worst[1] < 1e-3 * largest); // floats: residuals of 1e-5
@@ -151,13 +151,13 @@ static void floats_step_on_where_terms_cancel(void **state) {
     bar_random_q(x.b, 0.05, q);
     memcpy(ep_state_q(wide), q, sizeof q), memcpy(ep_state_q(floats), q, sizeof q);
     memset(ep_state_velocity(wide), 0, sizeof q), memset(ep_state_velocity(floats), 0, sizeof q);
-    largest = fmax(largest, norm(R, q));
+    largest = fmax(largest, norm_of(R, q));
     for (int step = 0; step < 40; step++) {
       ep_step_report report;
       assert_int_equal(ep_step(wide, &def, NULL), EP_OK);
       assert_int_equal(ep_step(floats, &def, &report), EP_OK);
       iterations = report.newton_iterations > iterations ? report.newton_iterations : iterations;
-      worst = fmax(worst, distance(R, ep_state_q(wide), ep_state_q(floats)));
+      worst = fmax(worst, distance_of(R, ep_state_q(wide), ep_state_q(floats)));
     }
   }
   assert_true(worst < 1e-3 * largest);
@@ -182,7 +182,8 @@ static void examples_act_beside_the_polynomial(void **state) {
     assert_int_equal(ep_step(all, &def, &one), EP_OK);
     assert_int_equal(ep_step(cubic, &def, &other), EP_OK);
   }
-  assert_true(distance(R, ep_state_q(all), ep_state_q(cubic)) < 1e-6 * norm(R, ep_state_q(all)));
+  assert_true(distance_of(R, ep_state_q(all), ep_state_q(cubic)) <
+              1e-6 * norm_of(R, ep_state_q(all)));
   assert_true(fabs(one.elastic_energy - other.elastic_energy) < 1e-6 * one.elastic_energy);
   assert_true(fabs(one.example_energy - other.example_energy) <= 1e-6 * one.elastic_energy);
   free(blocks[0]), free(blocks[1]);
@@ -207,7 +208,7 @@ static void no_cubature_is_needed(void **state) {
     assert_int_equal(ep_step(with, &def, NULL), EP_OK);
     assert_int_equal(ep_step(without, &def, NULL), EP_OK);
   }
-  assert_true(norm(R, ep_state_q(with)) > 0);
+  assert_true(norm_of(R, ep_state_q(with)) > 0);
   assert_memory_equal(ep_state_q(with), ep_state_q(without), R * sizeof(double));
   free(blocks[0]), free(blocks[1]);
   tear_down(&x);

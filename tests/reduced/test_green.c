@@ -61,7 +61,7 @@ static void difference_errors(scene *c, const ep_green *green, const double *q, 
     for (int o = 0; o < R; o++) hd[a] -= h[a * R + o] * d[o];
   }
   error[0] = fabs((wp - wm) / (2 * t) - slope);
-  error[1] = norm(R, hd);
+  error[1] = norm_of(R, hd);
 }
 
 // Central differences have an error of order t^2: halving t quarters it. All energies and gradients
@@ -74,14 +74,14 @@ static void check_differences(const ep_green *green) {
   difference_errors(&c, green, q, d, 0.2, coarse);
   difference_errors(&c, green, q, d, 0.1, fine);
   ep_green_energy(c.state, green, q, f, h);
-  assert_true(norm(R, f) > 0 && norm(R * R, h) > 0);
+  assert_true(norm_of(R, f) > 0 && norm_of(R * R, h) > 0);
   for (int i = 0; i < 2; i++) {
     const double order = log2(coarse[i] / fine[i]);
     if (!(fabs(order - 2) < 0.1)) fail_msg("order %g of derivative %d", order, i + 1);
   }
   for (int a = 0; a < R; a++)
     for (int o = 0; o < a; o++)
-      assert_true(fabs(h[a * R + o] - h[o * R + a]) <= 1e-12 * norm(R * R, h));
+      assert_true(fabs(h[a * R + o] - h[o * R + a]) <= 1e-12 * norm_of(R * R, h));
   drop(&c);
 }
 
@@ -108,7 +108,7 @@ static void vanishes_at_the_examples(void **state) {
     double f[R], elastic[R];
     const double w = ep_elastic_energy(c.state, q, elastic, NULL, 0);
     assert_true(fabs(total(&c, &all, q, f, NULL)) < 1e-12 * w);
-    assert_true(norm(R, f) < 1e-12 * norm(R, elastic));
+    assert_true(norm_of(R, f) < 1e-12 * norm_of(R, elastic));
     for (int i = 0; i < K; i++)
       assert_true(fabs(ep_state_green_weights(c.state)[i] - (i == j)) < 1e-11);
   }

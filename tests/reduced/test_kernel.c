@@ -29,13 +29,13 @@ static void compare(const bar *b, double amplitude, int project) {
   double e = ep_elastic_energy(state, q, f, k, project);
   double er = bar_reference(b, NULL, b->model.cubature_w, q, fr, kr, project);
   assert_true(er > 0 && fabs(e - er) < 1e-12 * er);
-  assert_true(distance(r, f, fr) < 1e-12 * norm(r, fr));
-  assert_true(distance(r * r, k, kr) < 1e-12 * norm(r * r, kr));
+  assert_true(distance_of(r, f, fr) < 1e-12 * norm_of(r, fr));
+  assert_true(distance_of(r * r, k, kr) < 1e-12 * norm_of(r * r, kr));
   e = ep_example_energy(state, w, q, f, k, project);
   er = bar_reference(b, b->model.example_finv, b->model.example_w, q, fr, kr, project);
   assert_true(fabs(e - er) < 1e-12 * er);
-  assert_true(distance(r, f, fr) < 1e-12 * norm(r, fr));
-  assert_true(distance(r * r, k, kr) < 1e-12 * norm(r * r, kr));
+  assert_true(distance_of(r, f, fr) < 1e-12 * norm_of(r, fr));
+  assert_true(distance_of(r * r, k, kr) < 1e-12 * norm_of(r * r, kr));
   for (int i = 0; i < r; i++)
     for (int j = 0; j < i; j++) assert_true(k[i * r + j] == k[j * r + i]);
   free(block);
@@ -112,7 +112,7 @@ static void rest_has_no_force(void **state) {
     ep_state *s = bar_state(b, &block);
     double q[R] = {0}, f[R], k[R * R];
     assert_true(ep_elastic_energy(s, q, f, k, 0) == 0);
-    assert_true(norm(20, f) == 0); // F = I exactly: no round-off either
+    assert_true(norm_of(20, f) == 0); // F = I exactly: no round-off either
     // lambda varies over the cubature, K0 has one: compare norms only roughly, and definiteness
     assert_true(k[0] > 0.5 * b->model.k0[0] && k[0] < 2 * b->model.k0[0]);
     free(block);
@@ -130,7 +130,7 @@ static void example_is_its_own_minimum(void **state) {
     ep_elastic_energy(s, b->model.example_q + 20, other, NULL, 0); // a force of usual size
     // F F^-1 = I to a few 1e-16: forces of that strain, energies of its square
     assert_true(ep_example_energy(s, w, b->model.example_q + 20, f, NULL, 0) < 1e-20);
-    assert_true(norm(20, f) < 1e-12 * norm(20, other));
+    assert_true(norm_of(20, f) < 1e-12 * norm_of(20, other));
     assert_true(ep_example_energy(s, w, q, f, NULL, 0) > 1); // and it costs to leave it
     free(block);
     bar_free(b);
@@ -162,7 +162,7 @@ static void derivative_errors(bar *b, ep_state *s, energy_function energy, doubl
     for (int j = 0; j < r; j++) fa[i] -= k[i * r + j] * d[j];
   }
   error[0] += fabs(slope);
-  error[1] += norm(r, fa);
+  error[1] += norm_of(r, fa);
 }
 
 static void derivatives_have_slope_two(void **state) {
@@ -189,7 +189,7 @@ static void derivatives_have_slope_two(void **state) {
 
 // Lowest eigenvalue over |K| by power iteration on |K| I - K (an upper bound of it).
 static double lowest_eigenvalue(int n, const double *k) {
-  const double shift = norm(n * n, k);
+  const double shift = norm_of(n * n, k);
   double x[R], y[R], value = 0;
   for (int i = 0; i < n; i++) x[i] = 1 + 0.1 * i;
   for (int round = 0; round < 5000; round++) {
@@ -198,7 +198,7 @@ static double lowest_eigenvalue(int n, const double *k) {
       y[i] = shift * x[i];
       for (int j = 0; j < n; j++) y[i] -= k[i * n + j] * x[j];
     }
-    const double length = norm(n, y);
+    const double length = norm_of(n, y);
     for (int i = 0; i < n; i++) x[i] = y[i] / length;
     value = shift - length;
   }

@@ -74,13 +74,13 @@ static void compare(subject *x, double amplitude, int project) {
   const double e = ep_elastic_energy(x->in_floats, q, f, k, project);
   const double er = ep_elastic_energy(x->in_doubles, q, fr, kr, project);
   assert_true(er > 0 && fabs(e - er) < 1e-12 * er);
-  assert_true(distance(r, f, fr) < 1e-12 * norm(r, fr));
-  assert_true(distance(r * r, k, kr) < 1e-6 * norm(r * r, kr));
-  assert_true(distance(r * r, k, kr) > 0); // floats were at work
+  assert_true(distance_of(r, f, fr) < 1e-12 * norm_of(r, fr));
+  assert_true(distance_of(r * r, k, kr) < 1e-6 * norm_of(r * r, kr));
+  assert_true(distance_of(r * r, k, kr) > 0); // floats were at work
   for (int i = 0; i < r; i++)
     for (int j = 0; j < i; j++) assert_true(k[i * r + j] == k[j * r + i]);
   assert_true(fabs(ep_elastic_energy(x->exact, q, fr, kr, project) - e) < 1e-6 * e);
-  assert_true(distance(r, f, fr) < 1e-6 * norm(r, fr));
+  assert_true(distance_of(r, f, fr) < 1e-6 * norm_of(r, fr));
   const double same = ep_elastic_energy(x->in_floats, q, NULL, NULL, project);
   assert_true(same == e);
 }
@@ -133,7 +133,7 @@ static void rest_has_no_force(void **state) {
   double q[R] = {0}, f[R];
   set_up(&x, 20, 0, 0, EP_STABLE_NEOHOOKEAN);
   assert_true(ep_elastic_energy(x.in_floats, q, f, NULL, 0) == 0);
-  assert_true(norm(20, f) == 0);
+  assert_true(norm_of(20, f) == 0);
   tear_down(&x);
 }
 
@@ -179,8 +179,8 @@ static void steps_converge_as_with_doubles(void **state) {
     assert_int_equal(ep_step(x.exact, &def, &report[1]), EP_OK);
     assert_true(report[0].residual <= 1e-10);
     for (int i = 0; i < 2; i++) iterations[i] += report[i].newton_iterations;
-    largest = fmax(largest, norm(20, ep_state_q(x.exact)));
-    worst = fmax(worst, distance(20, ep_state_q(x.exact), ep_state_q(x.in_floats)));
+    largest = fmax(largest, norm_of(20, ep_state_q(x.exact)));
+    worst = fmax(worst, distance_of(20, ep_state_q(x.exact), ep_state_q(x.in_floats)));
   }
   assert_true(worst > 0 && worst < 1e-5 * largest);
   assert_true(iterations[0] < 1.1 * iterations[1]); // the rounded Hessian costs no iterations

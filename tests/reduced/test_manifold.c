@@ -30,12 +30,12 @@ static void shape_on_manifold_is_its_own_target(void **unused) {
   ep_step_def def = ep_default_step();
   def.target_tolerance = 1e-10;
   assert_int_equal(ep_interpolate(state, &def, NULL), EP_OK);
-  const double first = distance(EXAMPLES, ep_state_weights(state), wanted + 1);
+  const double first = distance_of(EXAMPLES, ep_state_weights(state), wanted + 1);
   assert_true(first > 0.005); // eq. 5 alone misses: else this test says nothing
   // Halving the error of the shift a round: 60 rounds leave round-off and the tolerance above.
   for (int i = 0; i < 60; i++) assert_int_equal(ep_interpolate(state, &def, NULL), EP_OK);
-  assert_true(distance(EXAMPLES, ep_state_weights(state), wanted + 1) < 1e-6);
-  assert_true(distance(R, ep_state_target(state), shape) < 1e-6 * norm(R, shape));
+  assert_true(distance_of(EXAMPLES, ep_state_weights(state), wanted + 1) < 1e-6);
+  assert_true(distance_of(R, ep_state_target(state), shape) < 1e-6 * norm_of(R, shape));
   free(block);
   bar_free(b);
 }
@@ -55,7 +55,7 @@ static void corners_need_no_shift(void **unused) {
       assert_int_equal(ep_interpolate(state, &def, NULL), EP_OK);
       for (int e = 0; e < EXAMPLES; e++)
         assert_true(fabs(ep_state_weights(state)[e] - (e + 1 == i)) < 1e-7);
-      assert_true(distance(R, ep_state_target(state), corner) < 1e-7);
+      assert_true(distance_of(R, ep_state_target(state), corner) < 1e-7);
     }
   }
   free(block);
@@ -79,12 +79,12 @@ static void aimed_ahead(void **unused) {
   }
   assert_int_equal(ep_interpolate(moving, &def, NULL), EP_OK);
   assert_int_equal(ep_interpolate(still, &def, NULL), EP_OK);
-  assert_true(distance(R, ep_state_target(moving), ep_state_target(still)) == 0);
+  assert_true(distance_of(R, ep_state_target(moving), ep_state_target(still)) == 0);
   // Not the target of where it is now.
   const double here[R] = {0};
   memcpy(ep_state_velocity(moving), here, sizeof here);
   assert_int_equal(ep_interpolate(moving, &def, NULL), EP_OK);
-  assert_true(distance(R, ep_state_target(moving), ep_state_target(still)) > 0);
+  assert_true(distance_of(R, ep_state_target(moving), ep_state_target(still)) > 0);
   free(moving_block);
   free(still_block);
   bar_free(b);
@@ -105,7 +105,7 @@ static void swinging_dies_out(void **unused) {
   for (int a = 0; a < R; a++) ep_state_q(state)[a] = 0.6 * b->model.example_q[a];
   for (int i = 0; i < 1200; i++) {
     assert_int_equal(ep_step(state, &def, NULL), EP_OK);
-    swing[i / 300] = fmax(swing[i / 300], norm(R, ep_state_velocity(state)));
+    swing[i / 300] = fmax(swing[i / 300], norm_of(R, ep_state_velocity(state)));
   }
   if (!(swing[1] < 0.01 * swing[0] && swing[3] < 1e-6 * swing[0]))
     fail_msg("%g, %g, %g, %g", swing[0], swing[1], swing[2], swing[3]);

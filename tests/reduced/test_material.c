@@ -52,7 +52,7 @@ static double tangent_error(ep_material model, const double f[9], const double d
     pa[i] = (pa[i] - pb[i]) / (2 * h);
     for (int j = 0; j < 9; j++) pa[i] -= t[9 * i + j] * d[j];
   }
-  return norm(9, pa);
+  return norm_of(9, pa);
 }
 
 typedef double (*error_function)(ep_material, const double *, const double *, double);
@@ -174,7 +174,7 @@ static void rotation_is_nearest(void **state) {
     for (int i = 0; i < 3; i++)
       for (int j = 0; j < 3; j++)
         gram[3 * i + j] = r[i] * r[j] + r[3 + i] * r[3 + j] + r[6 + i] * r[6 + j] - (i == j);
-    assert_true(norm(9, gram) < 1e-13);
+    assert_true(norm_of(9, gram) < 1e-13);
     double det = r[0] * (r[4] * r[8] - r[5] * r[7]) + r[1] * (r[5] * r[6] - r[3] * r[8]) +
                  r[2] * (r[3] * r[7] - r[4] * r[6]);
     assert_true(fabs(det - 1) < 1e-13);
@@ -209,7 +209,7 @@ static void projection_is_nearest(void **state) {
       product[i] += p[9 * (i / 9) + k] * (p[9 * k + i % 9] - a[9 * k + i % 9]);
   }
   assert_true(moved > 0.1);
-  assert_true(norm(81, product) < 1e-12);
+  assert_true(norm_of(81, product) < 1e-12);
   for (int trial = 0; trial < 100; trial++) {
     double x[9], value = 0, gap = 0;
     for (int i = 0; i < 9; i++) x[i] = uniform();

@@ -73,7 +73,7 @@ static void step_is_a_minimum(void **unused) {
                                      ep_state_target(s.state)[c]);
         }
         for (int a = 0; a < R; a++) moved += fabs(x[a] - q[a]);
-        assert_true(norm(R, f) < 1e-4 * largest); // 1e-6 of forces that include the inertia
+        assert_true(norm_of(R, f) < 1e-4 * largest); // 1e-6 of forces that include the inertia
       }
       if (kind) assert_true(moved > 0);
       assert_true(ep_state_weights(s.state)[0] + ep_state_weights(s.state)[1] > 1e-3);
@@ -129,14 +129,15 @@ static void rest_stays_at_rest(void **unused) {
   create(&s, EP_STVK_VOLUME, K);
   ep_step_def def = ep_default_step();
   for (int i = 0; i < 20; i++) assert_int_equal(ep_step(s.state, &def, NULL), EP_OK);
-  assert_true(norm(R, ep_state_q(s.state)) == 0 && norm(R, ep_state_velocity(s.state)) == 0);
+  assert_true(norm_of(R, ep_state_q(s.state)) == 0 && norm_of(R, ep_state_velocity(s.state)) == 0);
   const double *q = s.b->model.example_q;
   double load[R];
   ep_elastic_energy(s.state, q, load, NULL, 0);
   memcpy(ep_state_q(s.state), q, R * sizeof *q);
   def.force = load; // the target is the example: the example force vanishes
   for (int i = 0; i < 20; i++) assert_int_equal(ep_step(s.state, &def, NULL), EP_OK);
-  for (int a = 0; a < R; a++) assert_true(fabs(ep_state_q(s.state)[a] - q[a]) < 1e-6 * norm(R, q));
+  for (int a = 0; a < R; a++)
+    assert_true(fabs(ep_state_q(s.state)[a] - q[a]) < 1e-6 * norm_of(R, q));
   destroy(&s);
 }
 
@@ -221,7 +222,7 @@ static void survives_a_hard_push(void **unused) {
     for (int i = 0; i < 60; i++) {
       if (i == 30) def.force = NULL; // released
       assert_int_equal(ep_step(s.state, &def, NULL), EP_OK);
-      assert_true(isfinite(norm(R, ep_state_q(s.state))));
+      assert_true(isfinite(norm_of(R, ep_state_q(s.state))));
     }
     destroy(&s);
   }
@@ -267,7 +268,7 @@ static void threads_agree(void **unused) {
   assert_non_null(run(&a));
   pthread_join(other, &result);
   assert_non_null(result);
-  assert_true(norm(R, ep_state_q(a.state)) > 0);
+  assert_true(norm_of(R, ep_state_q(a.state)) > 0);
   assert_memory_equal(ep_state_q(a.state), ep_state_q(b.state), R * sizeof(double));
   free(b.block);
   destroy(&a);

@@ -6,17 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static inline double norm(int n, const double *a) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += a[i] * a[i];
-  return sqrt(sum);
-}
-
-static inline double distance(int n, const double *a, const double *b) {
-  double sum = 0;
-  for (int i = 0; i < n; i++) sum += (a[i] - b[i]) * (a[i] - b[i]);
-  return sqrt(sum);
-}
+#include "tests/norms.h"
 
 // Memory aligned to 64 bytes, full of what is no number: whoever reads what nobody wrote shows it.
 static inline void *block_of(size_t bytes) {
