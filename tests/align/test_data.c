@@ -160,6 +160,8 @@ static void car_maps_itself(void **state) {
   measure(&d, "car", 10, false, &t);
   show_residuals(&t.map[0][1]);
   // Thresholds stand a few hundredths below the first measurement.
+  // Automatic object <- rest, now .925, was a little better before maps were refined elastically;
+  // the five others gained, those with regions the most (.95 to .98).
   assert_true(t.jaccard[0][0] > 0.9 && t.jaccard[0][1] > 0.96);
   assert_true(t.jaccard[1][0] > 0.89 && t.jaccard[1][1] > 0.96);
   assert_true(t.composed[0] > t.jaccard[2][0]); // composed better than independent
