@@ -265,7 +265,14 @@ static ep_status descend(repair *r, int *iterations, ep_error *err) {
 
 // ---- unfolding ---------------------------------------------------------------------------------
 
-// F of tet e with its singular values no less than UNFOLDED, right way round.
+static double determinant(const double a[9]) {
+  return a[0] * (a[4] * a[8] - a[5] * a[7]) + a[1] * (a[5] * a[6] - a[3] * a[8]) +
+         a[2] * (a[3] * a[7] - a[4] * a[6]);
+}
+
+// F of tet e with its singular values no less than UNFOLDED, right way round. That goes by the
+// factors themselves: where two singular values vanish J is round-off, of either sign, and so is
+// the handedness of the factors.
 static ep_status unfolded(const repair *r, int e, double *out, ep_error *err) {
   const double *shape = r->solver.gradient + 12 * (size_t)e;
   const int *v = r->mesh->tet + 4 * (size_t)e;
@@ -275,9 +282,8 @@ static ep_status unfolded(const repair *r, int e, double *out, ep_error *err) {
       const size_t at = 3 * (size_t)v[i] + (size_t)(k / 3);
       f[k] += (r->u0[at] + r->delta[at]) * shape[3 * i + k % 3];
     }
-  const bool inverted = jacobian(r, e, r->delta, NULL) < 0;
   EP_TRY(ep_svd(3, 3, f, left, s, right, err));
-  if (inverted) // the shortest axis points the wrong way
+  if (determinant(left) * determinant(right) < 0) // the shortest axis points the wrong way
     for (int k = 0; k < 3; k++) left[3 * k + 2] = -left[3 * k + 2];
   for (int i = 0; i < 9; i++) {
     out[i] = 0;
