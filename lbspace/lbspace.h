@@ -65,12 +65,13 @@ ep_status ep_lb_pose(const ep_mesh *mesh, const ep_lb *lb, const double *d,
 //   min sum_e V_e |F_e(u) - F_e(u0)|^2  with  det F_e(u) >= target  for every tet,
 // the first m coefficients Phi^T M u kept: exactly where nothing is held, else up to the softness
 // of ep_lb_pose. Held vertices do not move. A pose without such tets is left as it is, bit by bit.
+// Where some cannot be repaired the pose that leaves fewest of them is kept, be it the one given.
 typedef struct ep_repair_options {
   int m;                     // coefficients kept, <= lb->m; 0: none, lb may then be NULL
   const unsigned char *held; // (n) vertices that do not move, or NULL
   double floor;              // smallest deformed / rest volume that is no crushed tet: 0.05
   double target;             // what crushed tets are given: 0.12
-  int iterations;            // Gauss-Newton steps at most
+  int iterations;            // Gauss-Newton steps at most; 0: the pose is left as it is
 } ep_repair_options;
 ep_repair_options ep_default_repair_options(void);
 

@@ -26,12 +26,20 @@ ep_repair_options ep_default_repair_options(void) {
   return (ep_repair_options){.m = 10, .floor = 0.05, .target = 0.12, .iterations = 60};
 }
 
+typedef struct tet_counts {
+  int crushed, inverted;
+  double worst; // smallest deformed / rest volume
+} tet_counts;
+
 typedef struct repair {
   const ep_mesh *mesh;
   const ep_repair_options *o;
   ep_pose_solver solver;
   double *delta, *trial, *step; // (n x 3) u - u0; a proposal; the way there
   const double *u0;             // (n x 3)
+  double *best;                 // (n x 3) the delta seen that left least to repair, and
+  tet_counts left;              // what it left
+  int iterations;               // Gauss-Newton steps so far
   double *coefficients;         // (m x 3)
   double w;
   // active tets
@@ -243,19 +251,43 @@ static ep_status advance(repair *r, double *decrease, ep_error *err) {
   return EP_OK;
 }
 
+static tet_counts count_tets(const repair *r) {
+  tet_counts counts = {.worst = INFINITY};
+  for (int e = 0; e < r->mesh->nt; e++) {
+    const double j = jacobian(r, e, r->delta, NULL);
+    counts.inverted += !(j > 0);
+    counts.crushed += !(j >= r->o->floor);
+    counts.worst = fmin(counts.worst, j);
+  }
+  return counts;
+}
+
 static bool whole(const repair *r) {
   for (int e = 0; e < r->mesh->nt; e++)
     if (!(jacobian(r, e, r->delta, NULL) >= r->o->floor)) return false;
   return true;
 }
 
-static ep_status descend(repair *r, int *iterations, ep_error *err) {
-  for (; *iterations < r->o->iterations && !whole(r); ++*iterations) {
+// Neither a step nor an unfolding is sure to leave fewer crushed tets than there were.
+static void keep_best(repair *r) {
+  const tet_counts now = count_tets(r), best = r->left;
+  if (now.crushed > best.crushed) return;
+  if (now.crushed == best.crushed) {
+    if (now.inverted > best.inverted) return;
+    if (now.inverted == best.inverted && now.worst <= best.worst) return;
+  }
+  r->left = now;
+  memcpy(r->best, r->delta, 3 * (size_t)r->mesh->nv * sizeof *r->best);
+}
+
+static ep_status descend(repair *r, ep_error *err) {
+  for (; r->iterations < r->o->iterations && !whole(r); r->iterations++) {
     double decrease;
     EP_TRY(find_active(r, err));
     if (r->active > ACTIVE_MOST) return EP_OK; // no pose any more: the report says so
     EP_TRY(find_nodes(r, err));
     EP_TRY(advance(r, &decrease, err));
+    keep_best(r);
     if (decrease >= SETTLED) continue;
     if (r->w >= WEIGHT_LAST) return EP_OK;
     r->w *= WEIGHT_GROWTH;
@@ -334,31 +366,22 @@ static ep_status unfold(repair *r, ep_error *err) {
   return status;
 }
 
-static ep_status iterate(repair *r, int *iterations, ep_error *err) {
+static ep_status iterate(repair *r, ep_error *err) {
   r->w = WEIGHT_FIRST;
-  *iterations = 0;
-  EP_TRY(descend(r, iterations, err));
-  for (int i = 0; i < UNFOLDINGS && !whole(r) && r->active <= ACTIVE_MOST; i++) {
-    int more = 0;
+  r->left = count_tets(r);
+  EP_TRY(descend(r, err));
+  for (int i = 0;
+       i < UNFOLDINGS && r->iterations < r->o->iterations && !whole(r) && r->active <= ACTIVE_MOST;
+       i++) {
     EP_TRY(unfold(r, err));
-    EP_TRY(descend(r, &more, err));
-    *iterations += more;
+    keep_best(r);
+    EP_TRY(descend(r, err));
   }
+  memcpy(r->delta, r->best, 3 * (size_t)r->mesh->nv * sizeof *r->delta);
   return EP_OK;
 }
 
 // ---- the report --------------------------------------------------------------------------------
-
-static void count_tets(const repair *r, int *inverted, int *crushed, double *worst) {
-  *inverted = *crushed = 0;
-  *worst = INFINITY;
-  for (int e = 0; e < r->mesh->nt; e++) {
-    const double j = jacobian(r, e, r->delta, NULL);
-    *inverted += !(j > 0);
-    *crushed += !(j >= r->o->floor);
-    *worst = fmin(*worst, j);
-  }
-}
 
 static void measure_move(repair *r, ep_repair_report *report) {
   const ep_pose_solver *s = &r->solver;
@@ -407,7 +430,7 @@ static ep_status check(const ep_mesh *mesh, const ep_lb *lb, const ep_repair_opt
 static ep_status allocate(repair *r, const ep_lb *lb, ep_error *err) {
   static const ep_lb nothing = {0};
   const size_t n = (size_t)r->mesh->nv;
-  r->delta = calloc(9 * n, sizeof *r->delta);
+  r->delta = calloc(12 * n, sizeof *r->delta);
   r->place = malloc(n * sizeof *r->place);
   r->coefficients = malloc(3 * (size_t)(r->o->m + 1) * sizeof *r->coefficients);
   EP_TRY(ep_pose_solver_make(r->mesh, lb ? lb : &nothing, r->o->m, r->o->held, &r->solver, err));
@@ -415,6 +438,7 @@ static ep_status allocate(repair *r, const ep_lb *lb, ep_error *err) {
   if (!r->delta || !r->place || !r->coefficients || !r->pin) return no_memory(r, err);
   r->trial = r->delta + 3 * n;
   r->step = r->delta + 6 * n;
+  r->best = r->delta + 9 * n;
   for (size_t v = n; v-- > 0;) {
     r->place[v] = -1;
     r->pin[r->solver.component[v]] = (int)v;
@@ -458,9 +482,12 @@ static ep_status run(const ep_mesh *mesh, const ep_lb *lb, const ep_repair_optio
                      ep_repair_report *report, ep_error *err) {
   repair r = {.mesh = mesh, .o = o, .u0 = u};
   ep_status status = allocate(&r, lb, err);
-  if (status == EP_OK) status = iterate(&r, &report->iterations, err);
+  if (status == EP_OK) status = iterate(&r, err);
   if (status == EP_OK) {
-    count_tets(&r, &report->inverted_after, &report->crushed_after, &report->worst_after);
+    report->iterations = r.iterations;
+    report->inverted_after = r.left.inverted;
+    report->crushed_after = r.left.crushed;
+    report->worst_after = r.left.worst;
     measure_move(&r, report);
     for (int i = 0; i < 3 * mesh->nv; i++)
       if (!o->held || !o->held[i / 3]) u[i] += r.delta[i];
@@ -480,5 +507,5 @@ ep_status ep_lb_repair(const ep_mesh *mesh, const ep_lb *lb, const ep_repair_opt
     return ep_fail(err, EP_ERR_MEMORY, "no memory to look at a pose of %d vertices", mesh->nv);
   const bool needed = needs_repair(mesh, options, u, report, volume);
   free(volume);
-  return needed ? run(mesh, lb, options, u, report, err) : EP_OK;
+  return needed && options->iterations ? run(mesh, lb, options, u, report, err) : EP_OK;
 }

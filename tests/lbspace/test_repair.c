@@ -1,7 +1,8 @@
 // Claims for the repair of poses, min |grad(u - u0)|^2 under det F >= target with low coefficients
 // kept: a sound pose is left bit by bit; tets turned over by misplaced vertices get volume, the low
 // coefficients stay (exactly when free), held vertices do not move, far away hardly anything moves;
-// turning everything turns the result; what is hopeless is reported as it is.
+// turning everything turns the result; flat tets are opened the right way round; steps are limited;
+// what is hopeless is reported as it is.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -77,12 +78,13 @@ static int inverted(const bench *b, const double *u, double *worst) {
   return count;
 }
 
-static ep_repair_report repair(bench *b, int m, const unsigned char *held) {
+static ep_repair_report repair_within(bench *b, int m, const unsigned char *held, int iterations) {
   ep_repair_options options = ep_default_repair_options();
   ep_repair_report report;
   ep_error err = {0};
   options.m = m;
   options.held = held;
+  options.iterations = iterations;
   memcpy(b->u, b->given, 3 * (size_t)b->mesh.nv * sizeof *b->u);
   if (ep_lb_repair(&b->mesh, m ? &b->lb : NULL, &options, b->u, &report, &err) != EP_OK)
     fail_msg("%s", err.text);
@@ -92,7 +94,12 @@ static ep_repair_report repair(bench *b, int m, const unsigned char *held) {
   // the report counts what was found, whatever it is
   assert_int_equal(report.inverted_after, inverted(b, b->u, &worst));
   assert_true(fabs(report.worst_after - worst) < 1e-9);
+  assert_true(report.iterations <= iterations);
   return report;
+}
+
+static ep_repair_report repair(bench *b, int m, const unsigned char *held) {
+  return repair_within(b, m, held, ep_default_repair_options().iterations);
 }
 
 static void test_sound_poses_are_left(void **state) {
@@ -267,6 +274,38 @@ static void test_flat_tets_are_opened(void **state) {
   ep_mesh_free(&tet);
 }
 
+// A vertex in the middle drawn to a far point and its neighbours strewn about: more than a few
+// steps mend.
+static void crumple(bench *b) {
+  ep_random rng = ep_random_seed(2, 0);
+  for (int i = 0; i < b->mesh.nv; i++)
+    for (int k = 0; k < 3; k++)
+      b->given[3 * i + k] = 0.4 * ep_random_normal(&rng) * (fabs(b->mesh.x[3 * i] - 2) < 0.8);
+}
+
+// Steps are spent once, on descents and unfoldings together; none: nothing moves. More steps never
+// leave more crushed tets than fewer did.
+static void test_steps_are_limited(void **state) {
+  (void)state;
+  bench b = bench_make();
+  int crushed = 0, spent = 0;
+  crumple(&b);
+  for (int most = 0; most <= 40; most += most < 20 ? 2 : 20) {
+    const ep_repair_report report = repair_within(&b, 0, NULL, most);
+    print_message("%d steps at most: %d of %d crushed tets left after %d\n", most,
+                  report.crushed_after, report.crushed_before, report.iterations);
+    if (most == 0) {
+      assert_memory_equal(b.u, b.given, 3 * (size_t)b.mesh.nv * sizeof *b.u);
+      crushed = report.crushed_before;
+    }
+    assert_true(report.crushed_after <= crushed);
+    crushed = report.crushed_after;
+    spent = report.iterations;
+  }
+  assert_true(spent > 10); // else nothing was limited
+  bench_free(&b);
+}
+
 static void test_bad_options(void **state) {
   (void)state;
   bench b = bench_make();
@@ -299,6 +338,7 @@ int main(void) {
       cmocka_unit_test(test_turned_pose),
       cmocka_unit_test(test_hopeless_pose),
       cmocka_unit_test(test_flat_tets_are_opened),
+      cmocka_unit_test(test_steps_are_limited),
       cmocka_unit_test(test_bad_options),
   };
   return cmocka_run_group_tests_name("pose repair", tests, session_start, session_stop);
