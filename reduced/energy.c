@@ -159,9 +159,10 @@ int ep_force_terms(ep_state *state, const ep_step_def *def, int terms) {
   return terms;
 }
 
-void ep_packed_gradient(const ep_state *state, const double *packed, int e, double f[9]) {
+// F of one element, in the layout's own lanes (padded_q holds q and zeros).
+static void element_gradient(const ep_state *state, int e, double f[9]) {
   const int blocks = state->model->size.blocks;
-  const double *g = packed + (size_t)e * (size_t)blocks * 72;
+  const double *g = state->model->cubature_g + (size_t)e * (size_t)blocks * 72;
   for (int c = 0; c < 9; c++) {
     double sum[EP_LANES] = {0};
     for (int b = 0; b < blocks; b++)
@@ -183,7 +184,7 @@ static void freeze(ep_state *state, int set, const double *weight) {
       for (int c = 0; c < 9; c++) inverse[9 * e + c] = c % 4 == 0;
       continue;
     }
-    ep_packed_gradient(state, m->cubature_g, e, f);
+    element_gradient(state, e, f);
     state->target_weight[(size_t)set * s + (size_t)e] =
         weight[e] * ep_reference_element(f, inverse + 9 * e);
   }

@@ -19,6 +19,8 @@
 // it was looked at last, q_0, and how far F may go from there before any of the group can reach its
 // limit. |F - F_0| <= sum_a |q_a - q_0a| growth_a, and
 //   det(F_0 + D) >= J_0 - |cof F_0| d - |F_0| d^2 / sqrt 3 - d^3 / (3 sqrt 3),   d = |D|.
+// While nothing was near a limit where all groups were looked over last, q_h, one such sum with the
+// largest growth of all groups, from q_h, stands for all of them: most evaluations cost O(r).
 // Groups passed over would have added exact zeros: results do not depend on what was remembered.
 #ifndef EP_REDUCED_GUARD_H
 #define EP_REDUCED_GUARD_H
@@ -34,6 +36,9 @@
 #define EP_GUARD_SOFTNESS 0.2
 
 struct ep_state;
+
+// A state that never looked.
+void ep_guard_init(struct ep_state *state);
 
 // At the beginning of a step from state->q: walls or parabolas.
 void ep_guard_begin(struct ep_state *state);

@@ -73,6 +73,7 @@ static void use_isa(ep_state *state, ep_isa isa) {
   state->isa = ep_isa_name(isa);
   state->kernel = ep_kernel_of(isa);
   state->green_kernel = ep_green_of(isa);
+  state->guard_kernel = ep_guard_of(isa);
   if (!state->cubic.stream) return;
   state->cubic.isa = state->isa;
   state->cubic.kernel = ep_cubic_kernel_of(isa, state->cubic.precision);
@@ -116,6 +117,7 @@ ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_st
     return EP_ERR_ARGUMENT;
   use_isa(state, ep_isa_here());
   measure_scales(state);
+  ep_guard_init(state);
   if (!ep_cholesky(model->size.r, model->k0, state->k0_factor)) return EP_ERR_NUMERIC;
   *out = state;
   return EP_OK;

@@ -7,6 +7,7 @@
 #include "reduced/eigenpose.h"
 #include "reduced/green.h"
 #include "reduced/guard.h"
+#include "reduced/guard_kernel.h"
 #include "reduced/kernel.h"
 #include "reduced/region.h"
 #include "reduced/unfold.h"
@@ -58,6 +59,9 @@
   X(cubic_k, cubic_words ? r * r : 0)                                                             \
   X(guard_at, guard_groups * width) /* guards: where each group was looked at, and its way from there */ \
   X(guard_reach, guard_groups)                                                                    \
+  X(guard_gone, guard_groups)       /* how far it is from there; largest growth of any group, */  \
+  X(guard_most, guard_groups ? width : 0) /* and where the last step began */                     \
+  X(guard_hub, guard_groups ? width : 0)                                                          \
   X(green_y0, greens)      /* Green-strain path (reduced/green.c) */                              \
   X(green_y, greens)                                                                              \
   X(green_last, greens)                                                                           \
@@ -100,6 +104,7 @@ struct ep_state {
   const ep_model *model;
   ep_kernel kernel;
   ep_green_kernel green_kernel;
+  ep_guard_kernel guard_kernel;
   const char *isa;
   ep_cubic cubic;      // where the model's evaluator is cubic
   double cubic_energy; // at cubic_at, where cubic_known
@@ -110,13 +115,14 @@ struct ep_state {
   double force_scale;  // sum_j w_j (lambda + 2 mu) |G_j|: generalised force at unit strain
   double strain_scale; // max_j |G_j|_F: strain by a unit q
   ep_contact contact;
-  int guards_soft;  // parabolas in place of walls (reduced/guard.h)
-  int guards_over;  // guards with J < 0 at the beginning of the step
-  ep_unfold unfold; // the way out of a jam
-  int has_target;   // a target was found before
-  double dt_before; // of the last step; 0: none, or q or v was written since
-  ep_frame frame;   // free motion: reduced/frame.h; at the end of the last step
-  double linear[3]; // momentum, angular momentum about the centre of mass; world axes
+  double guard_calm; // way from guard_hub on which no guard can reach its limit
+  int guards_soft;   // parabolas in place of walls (reduced/guard.h)
+  int guards_over;   // guards with J < 0 at the beginning of the step
+  ep_unfold unfold;  // the way out of a jam
+  int has_target;    // a target was found before
+  double dt_before;  // of the last step; 0: none, or q or v was written since
+  ep_frame frame;    // free motion: reduced/frame.h; at the end of the last step
+  double linear[3];  // momentum, angular momentum about the centre of mass; world axes
   double angular[3];
   double linear_rate[3], angular_rate[3]; // of the last step, without contact (Newmark)
   double c_before[3], linear_before[3], angular_before[3]; // at its beginning (BDF2)
@@ -157,9 +163,6 @@ double ep_green_share(const ep_model *model, const ep_green *green);
 // strength W_a at q; its gradient and Hessian are added to f and h unless NULL (reduced/green.c).
 double ep_green_add(ep_state *state, const ep_green *green, double strength, const double *q,
                     double *f, double *h);
-
-// F (9, by rows) of element e of packed gradients (reduced/pack.c), of the q in padded_q.
-void ep_packed_gradient(const ep_state *state, const double *packed, int e, double f[9]);
 
 // Terms of the example force with the targets as they are frozen, from `term` on: one for each
 // region with strength. Returns how many terms there are then.

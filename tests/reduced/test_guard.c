@@ -1,9 +1,11 @@
 // Guards. Claims: their energy is sum_e w_e k_e b(J_e / limit_e) with b(x) = -(x - 1)^2 log x below
 // 1 and its parabola below the floor, C2; gradient and Hessian are its derivatives (central
-// differences, error ~ h^2), projected Hessians are positive semidefinite; what the state remembers
-// of where it looked changes no bit; an inverted object is driven back, a collapsed one too; of a
-// hard push on a bar of few cubature elements no tet of the whole mesh is inverted at any time (of
-// the hardest none once it ended), and without guards some are; nothing happens near rest.
+// differences, error ~ h^2), projected Hessians are positive semidefinite; no F within the reach of
+// a group brings a guard to its limit, and no mode moves F further than what is gone; both in the
+// same bits on every instruction set; what the state remembers of where it looked changes no bit;
+// an inverted object is driven back, a collapsed one too; of a hard push on a bar of few cubature
+// elements no tet of the whole mesh is inverted at any time (of the hardest none once it ended),
+// and without guards some are; nothing happens near rest.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -253,6 +255,88 @@ static void memory_changes_nothing(void **state) {
   bar_free(b);
 }
 
+// |G_e d| of a guard.
+static double change(const bar *b, int guard, const double *d) {
+  const double *g = b->g + 9 * (size_t)b->model.guard_tet[guard] * R;
+  double square = 0;
+  for (int c = 0; c < 9; c++) {
+    double sum = 0;
+    for (int a = 0; a < R; a++) sum += g[c * R + a] * d[a];
+    square += sum * sum;
+  }
+  return sqrt(square);
+}
+
+// Reach of the first group from q, on every instruction set the same.
+static double reach_of(const bar *b, const double *padded, double *jacobians) {
+  const ep_model *m = &b->model;
+  double first = 0, same[8];
+  for (int isa = 0; isa <= (int)ep_isa_here(); isa++) {
+    const double reach =
+        ep_guard_of((ep_isa)isa)
+            .reach(8, m->size.blocks, m->guard_g, m->guard_limit, padded, jacobians);
+    if (isa == 0) first = reach, memcpy(same, jacobians, sizeof same);
+    assert_true(reach == first);
+    assert_memory_equal(jacobians, same, sizeof same);
+  }
+  return first;
+}
+
+static void reach_is_safe(void **state) {
+  (void)state;
+  bar *b = make(0.5);
+  _Alignas(64) double q[16] = {0}, jacobians[8];
+  int far = 0, at = 0;
+  for (int i = 0; i < 200; i++) {
+    bar_random_q(b, 0.01 * i, q);
+    const double reach = reach_of(b, q, jacobians);
+    double room = 1;
+    for (int e = 0; e < 8; e++) {
+      assert_true(fabs(jacobians[e] - jacobian(b, e, q)) <= 1e-12 * (1 + fabs(jacobians[e])));
+      room = fmin(room, jacobians[e] - b->model.guard_limit[e]);
+    }
+    assert_true(room > 1e-8 ? reach > 0 : room > 0 || reach == 0);
+    for (int j = 0; reach > 0 && j < 50; j++) {
+      double d[R], there[R], most = 0;
+      bar_random_q(b, 1, d);
+      for (int e = 0; e < 8; e++) most = fmax(most, change(b, e, d));
+      for (int a = 0; a < R; a++) there[a] = q[a] + reach / most * d[a];
+      for (int e = 0; e < 8; e++)
+        assert_true(jacobian(b, e, there) >= b->model.guard_limit[e] - 1e-12);
+    }
+    far += reach > 0, at += reach == 0;
+  }
+  assert_true(far > 50 && at > 50);
+  // At rest the nearest F with det = limit is (1 - d / sqrt 3) I: the bound gives half of d.
+  memset(q, 0, sizeof q);
+  const double d = sqrt(3) * (1 - cbrt(0.5)), reach = reach_of(b, q, jacobians);
+  assert_true(reach < d && reach > 0.5 * d);
+  bar_free(b);
+}
+
+static void gone_is_no_less_than_the_change(void **state) {
+  (void)state;
+  bar *b = make(0.5);
+  const ep_model *m = &b->model;
+  enum { GROUPS = (GUARDS + 7) / 8 };
+  _Alignas(64) double q[16] = {0}, at[16 * GROUPS] = {0};
+  double gone[GROUPS], same[GROUPS], d[R];
+  for (int i = 0; i < 100; i++) {
+    bar_random_q(b, 1, q);
+    for (int g = 0; g < GROUPS; g++) bar_random_q(b, 1, at + 16 * g);
+    for (int isa = 0; isa <= (int)ep_isa_here(); isa++) {
+      ep_guard_of((ep_isa)isa).gone(GROUPS, m->size.blocks, m->guard_growth, at, q, gone);
+      if (isa == 0) memcpy(same, gone, sizeof same);
+      assert_memory_equal(gone, same, sizeof same);
+    }
+    for (int e = 0; e < GUARDS; e++) {
+      for (int a = 0; a < R; a++) d[a] = q[a] - at[e / 8 * 16 + a];
+      assert_true(change(b, e, d) <= gone[e / 8] * (1 + 1e-12));
+    }
+  }
+  bar_free(b);
+}
+
 static void rest_is_untouched(void **state) {
   (void)state;
   bar *b = make(0.3);
@@ -365,11 +449,18 @@ static void inverted_starts_recover(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(is_the_sum_of_the_walls),     cmocka_unit_test(derivatives_are_right),
-      cmocka_unit_test(parabolas_are_right),         cmocka_unit_test(parabolas_come_and_go),
-      cmocka_unit_test(parts_meet_smoothly),         cmocka_unit_test(projection_is_semidefinite),
-      cmocka_unit_test(memory_changes_nothing),      cmocka_unit_test(rest_is_untouched),
-      cmocka_unit_test(a_hard_push_inverts_nothing), cmocka_unit_test(inverted_starts_recover),
+      cmocka_unit_test(is_the_sum_of_the_walls),
+      cmocka_unit_test(derivatives_are_right),
+      cmocka_unit_test(parabolas_are_right),
+      cmocka_unit_test(parabolas_come_and_go),
+      cmocka_unit_test(parts_meet_smoothly),
+      cmocka_unit_test(projection_is_semidefinite),
+      cmocka_unit_test(reach_is_safe),
+      cmocka_unit_test(gone_is_no_less_than_the_change),
+      cmocka_unit_test(memory_changes_nothing),
+      cmocka_unit_test(rest_is_untouched),
+      cmocka_unit_test(a_hard_push_inverts_nothing),
+      cmocka_unit_test(inverted_starts_recover),
       cmocka_unit_test(random_starts_recover),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
