@@ -5,15 +5,7 @@
 
 #include "reduced/guard_kernel.h"
 #include "reduced/kernel.h"
-
-#if defined(__AVX512F__)
-enum { PART = 8 };
-#elif defined(__AVX2__)
-enum { PART = 4 };
-#else
-enum { PART = 2 };
-#endif
-typedef double part __attribute__((vector_size(8 * PART)));
+#include "reduced/lanes.h"
 
 // Round-off of F and of the bound: a guard within this of its limit is there.
 static const double slack = 1e-9;

@@ -14,8 +14,10 @@
 // Register tile of K += G^T B: rows x vectors of 8 columns.
 #if defined(__AVX512F__)
 enum { TILE_ROWS = 8, TILE_COLUMNS = 2 };
-#else
+#elif defined(__AVX2__)
 enum { TILE_ROWS = 4, TILE_COLUMNS = 1 };
+#else
+enum { TILE_ROWS = 2, TILE_COLUMNS = 1 };
 #endif
 
 #include "reduced/kernel_float_body.h"
@@ -27,20 +29,29 @@ LANE_INLINE lane gather(const double *x, int stride, int first, int s, double be
   return out;
 }
 
+// The sums over lanes of modes of one element's F.
+LANE_INLINE void gradient_rows(const ep_kernel_task *t, int e, lane sum[9][EP_LANES], int at) {
+  const lane *g = (const lane *)t->g + (size_t)e * (size_t)t->blocks * 9, *q = (const lane *)t->q;
+  for (int p = 0; p < PARTS; p++) {
+    part row[9];
+    for (int c = 0; c < 9; c++) row[c] = part_all(0);
+    for (int b = 0; b < t->blocks; b++)
+      for (int c = 0; c < 9; c++) row[c] += part_of(g + 9 * b + c, p) * part_of(q + b, p);
+    for (int c = 0; c < 9; c++) ((part *)&sum[c][at])[p] = row[c];
+  }
+}
+
 // F of elements first .. first + 7 (lanes of elements).
 static void deformation_gradients(const ep_kernel_task *t, int first, lane f[9]) {
-  const lane *q = (const lane *)t->q;
   lane sum[9][EP_LANES];
   for (int e = 0; e < EP_LANES; e++) {
+    if (first + e < t->s && !t->g_float) {
+      gradient_rows(t, first + e, sum, e);
+      continue;
+    }
     lane row[9];
     for (int c = 0; c < 9; c++) row[c] = lane_all(0);
-    if (first + e < t->s && t->g_float) {
-      narrow_rows(t, first + e, row);
-    } else if (first + e < t->s) {
-      const lane *g = (const lane *)t->g + (size_t)(first + e) * (size_t)t->blocks * 9;
-      for (int b = 0; b < t->blocks; b++)
-        for (int c = 0; c < 9; c++) row[c] += g[9 * b + c] * q[b];
-    }
+    if (first + e < t->s) narrow_rows(t, first + e, row);
     for (int c = 0; c < 9; c++) sum[c][e] = row[c];
   }
   for (int c = 0; c < 9; c++) f[c] = lane_sum8(sum[c]) + lane_all(c % 4 == 0);
@@ -110,15 +121,16 @@ static void add_term(const ep_kernel_task *t, const ep_kernel_term *term, int fi
 static void add_force(const ep_kernel_task *t, int first, const lane stress[9]) {
   const int count = t->s - first < EP_LANES ? t->s - first : EP_LANES;
   lane *f = (lane *)t->f;
-  for (int b = 0; b < t->blocks; b++) {
-    lane chain[3] = {f[b], lane_all(0), lane_all(0)};
+  for (int i = 0; i < t->blocks * PARTS; i++) {
+    const int b = i / PARTS, p = i % PARTS;
+    part *out = (part *)(f + b) + p, chain[3] = {*out, part_all(0), part_all(0)};
     for (int e = 0; e < count; e++) {
       const lane *g =
           (const lane *)t->g + ((size_t)(first + e) * (size_t)t->blocks + (size_t)b) * 9;
-      const double *p = (const double *)stress + e;
-      for (int c = 0; c < 9; c++) chain[c % 3] += g[c] * lane_all(p[EP_LANES * c]);
+      const double *x = (const double *)stress + e;
+      for (int c = 0; c < 9; c++) chain[c % 3] += part_of(g + c, p) * part_all(x[EP_LANES * c]);
     }
-    f[b] = (chain[0] + chain[1]) + chain[2];
+    *out = (chain[0] + chain[1]) + chain[2];
   }
 }
 
@@ -130,11 +142,13 @@ static void tangent_times_modes(const ep_kernel_task *t, int first, const lane *
     const double *h = (const double *)tangent + e;
     const lane *g = (const lane *)t->g + (size_t)(first + e) * (size_t)t->blocks * 9;
     lane *row = out + (size_t)e * (size_t)t->blocks * 9;
-    for (int b = 0; b < t->blocks; b++, g += 9, row += 9) {
+    for (int b = 0; b < t->blocks * PARTS; b++) {
+      const part *x = (const part *)(g + 9 * (b / PARTS)) + b % PARTS;
+      part *y = (part *)(row + 9 * (b / PARTS)) + b % PARTS;
       for (int i = 0; i < 9; i++) {
-        lane sum = g[0] * lane_all(h[EP_LANES * 9 * i]);
-        for (int j = 1; j < 9; j++) sum += g[j] * lane_all(h[EP_LANES * (9 * i + j)]);
-        row[i] = sum;
+        part sum = x[0] * part_all(h[EP_LANES * 9 * i]);
+        for (int j = 1; j < 9; j++) sum += x[PARTS * j] * part_all(h[EP_LANES * (9 * i + j)]);
+        y[PARTS * i] = sum;
       }
     }
   }
@@ -144,25 +158,26 @@ static void tangent_times_modes(const ep_kernel_task *t, int first, const lane *
 // `column` on, over all elements of one group.
 LANE_INLINE void add_tile(const ep_kernel_task *t, const lane *g, const lane *b, int count, int row,
                           int column, const int columns) {
-  const size_t stride = (size_t)t->blocks * 9;
-  lane sum[TILE_ROWS][TILE_COLUMNS];
-  lane *k = (lane *)t->k + (size_t)row * (size_t)t->blocks + column;
+  const size_t stride = (size_t)t->blocks * 9, width = (size_t)(t->blocks * PARTS);
+  const int wide = columns * PARTS;
+  part sum[TILE_ROWS][TILE_COLUMNS * PARTS];
+  part *k = (part *)t->k + (size_t)row * width + (size_t)(column * PARTS);
   for (int i = 0; i < TILE_ROWS; i++)
-    for (int j = 0; j < columns; j++) sum[i][j] = k[(size_t)i * (size_t)t->blocks + (size_t)j];
+    for (int j = 0; j < wide; j++) sum[i][j] = k[(size_t)i * width + (size_t)j];
   for (int e = 0; e < count; e++) {
     const double *left = (const double *)(g + (size_t)e * stride + 9 * (row / 8)) + row % 8;
     const lane *right = b + (size_t)e * stride + 9 * (size_t)column;
     for (int c = 0; c < 9; c++) {
-      lane x[TILE_COLUMNS];
-      for (int j = 0; j < columns; j++) x[j] = right[9 * j + c];
+      part x[TILE_COLUMNS * PARTS];
+      for (int j = 0; j < wide; j++) x[j] = part_of(right + 9 * (j / PARTS) + c, j % PARTS);
       for (int i = 0; i < TILE_ROWS; i++) {
-        const lane y = lane_all(left[8 * c + i]);
-        for (int j = 0; j < columns; j++) sum[i][j] += y * x[j];
+        const part y = part_all(left[8 * c + i]);
+        for (int j = 0; j < wide; j++) sum[i][j] += y * x[j];
       }
     }
   }
   for (int i = 0; i < TILE_ROWS; i++)
-    for (int j = 0; j < columns; j++) k[(size_t)i * (size_t)t->blocks + (size_t)j] = sum[i][j];
+    for (int j = 0; j < wide; j++) k[(size_t)i * width + (size_t)j] = sum[i][j];
 }
 
 // K += G^T B on the blocks of the upper triangle.

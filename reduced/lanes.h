@@ -11,6 +11,33 @@ typedef double lane __attribute__((vector_size(64)));
 typedef int64_t lane_mask __attribute__((vector_size(64)));
 #define LANE_INLINE static inline __attribute__((always_inline))
 
+// A lane in registers of the level's width: gcc splits wider vectors through memory, so the loops
+// over modes, where nearly all time goes, take them apart themselves.
+#if defined(__AVX512F__)
+enum { PART = 8 };
+#elif defined(__AVX2__)
+enum { PART = 4 };
+#else
+enum { PART = 2 };
+#endif
+enum { PARTS = 8 / PART };
+typedef double part __attribute__((vector_size(8 * PART)));
+
+// Part p of a lane in memory.
+LANE_INLINE part part_of(const lane *x, int p) {
+  return ((const part *)x)[p];
+}
+
+LANE_INLINE part part_all(double x) {
+#if defined(__AVX512F__)
+  return (part){x, x, x, x, x, x, x, x};
+#elif defined(__AVX2__)
+  return (part){x, x, x, x};
+#else
+  return (part){x, x};
+#endif
+}
+
 LANE_INLINE lane lane_all(double x) {
   return (lane){x, x, x, x, x, x, x, x};
 }
@@ -23,12 +50,21 @@ LANE_INLINE int lane_any(lane_mask m) {
   return (m[0] | m[1] | m[2] | m[3] | m[4] | m[5] | m[6] | m[7]) != 0;
 }
 
-LANE_INLINE double lane_sum(lane x) {
+LANE_INLINE double array_sum(const double x[8]) {
   return ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7]));
+}
+
+LANE_INLINE double lane_sum(lane x) {
+  return array_sum((const double *)&x);
 }
 
 // Lane i of the result: lane_sum(v[i]), the same order of additions.
 LANE_INLINE lane lane_sum8(const lane v[8]) {
+#if !defined(__AVX512F__)
+  lane sum;
+  for (int i = 0; i < 8; i++) ((double *)&sum)[i] = array_sum((const double *)(v + i));
+  return sum;
+#else
   lane t[4], u[2];
   for (int i = 0; i < 4; i++) {
     lane a = v[2 * i], b = v[2 * i + 1];
@@ -42,6 +78,7 @@ LANE_INLINE lane lane_sum8(const lane v[8]) {
   }
   return __builtin_shufflevector(u[0], u[1], 0, 1, 2, 3, 8, 9, 10, 11) +
          __builtin_shufflevector(u[0], u[1], 4, 5, 6, 7, 12, 13, 14, 15);
+#endif
 }
 
 #endif
