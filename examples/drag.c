@@ -48,23 +48,37 @@ static void hold(const ep_model *model, int vertex, double *rows, ep_spring *spr
   spring->rows = rows;
 }
 
-// A step that fails leaves the state as it was: two halves of it are tried once.
-static ep_status advance(ep_state *state, ep_step_def *def, ep_springs *springs, double dt) {
-  for (int parts = 1; parts <= 2; parts++) {
+// Of the mouse's way from `from` to `to` in a frame the part between two shares of it.
+static void drag(ep_spring *spring, const double *from, const double *to, double begin,
+                 double end) {
+  for (int i = 0; i < 3; i++) {
+    spring->from[i] = from[i] + begin * (to[i] - from[i]);
+    spring->to[i] = from[i] + end * (to[i] - from[i]);
+  }
+}
+
+// One frame of dt, the mouse going from `from` to `to`. A step that fails leaves the state as it
+// was: two halves of it are tried once, the mouse going half its way in each. Returns how many
+// seconds the state has gone on: dt, or less where it failed.
+static double advance(ep_state *state, ep_step_def *def, ep_springs *springs, const double *from,
+                      const double *to, double dt) {
+  for (int parts = 1;; parts = 2) {
     ep_status status = EP_OK;
+    int done = 0;
     def->dt = dt / parts;
-    for (int i = 0; i < parts && status == EP_OK; i++) {
+    while (done < parts && status == EP_OK) {
+      drag(springs->spring, from, to, (double)done / parts, (done + 1.0) / parts);
       ep_springs_begin(state, def->dt, springs);
       status = ep_step(state, def, NULL);
+      if (status == EP_OK) done++;
     }
-    if (status != EP_ERR_NUMERIC) return status;
+    if (parts == 2 || status != EP_ERR_NUMERIC) return dt * done / parts;
   }
-  return EP_ERR_NUMERIC;
 }
 
 static int simulate(ep_state *state, const ep_model *model, double seconds, double *rows,
                     double *x) {
-  const double dt = 1.0 / 60, size = model->rest_scale;
+  const double dt = 1.0 / 60, up = 0.2 * model->rest_scale; // of the mouse, in a second
   const int vertex = pick(model), steps = (int)(seconds / dt + 0.5);
   ep_spring spring;
   ep_springs springs = {1, &spring, dt};
@@ -77,12 +91,11 @@ static int simulate(ep_state *state, const ep_model *model, double seconds, doub
   spring.stiffness = 500; // N/m
   spring.damping = 5;     // N s/m
   for (int step = 0; step < steps; step++) {
-    for (int i = 0; i < 3; i++) { // the mouse goes up by a fifth of the object in a second
-      spring.from[i] = spring.rest[i] + (i == 1 ? 0.2 * size * step * dt : 0);
-      spring.to[i] = spring.rest[i] + (i == 1 ? 0.2 * size * (step + 1) * dt : 0);
-    }
-    if (advance(state, &def, &springs, dt) != EP_OK) {
-      fprintf(stderr, "step %d failed; the state is that before it\n", step);
+    const double from[3] = {spring.rest[0], spring.rest[1] + up * step * dt, spring.rest[2]};
+    const double to[3] = {from[0], spring.rest[1] + up * (step + 1) * dt, from[2]};
+    const double gone = advance(state, &def, &springs, from, to, dt);
+    if (gone < dt) {
+      fprintf(stderr, "step %d failed; the state is that at %g s\n", step, step * dt + gone);
       return 1;
     }
     ep_state_positions(state, x); // n x 3, for the vertex buffer
