@@ -10,8 +10,10 @@ typedef struct simulation {
   const ep_scene *scene;
   const ep_model *model;
   ep_stepper *stepper;
-  ep_state *state; // the stepper's
-  ep_advance done; // the last step
+  ep_state *state;    // the stepper's
+  ep_advance done;    // the last step
+  double *x;          // (n x 3) positions of the state
+  double *descriptor; // (3m) of the state, NULL where no weights are noted
   ep_record *record;
 } simulation;
 
@@ -45,18 +47,20 @@ static ep_status make_record(const ep_scene *scene, const ep_model *model, ep_re
 }
 
 // Weights of the shape at hand, also where the examples have no force (strength 0).
-static ep_status note_weights(simulation *s, double *out) {
-  const ep_model *model = s->model;
-  double *c = malloc(3 * (size_t)model->size.m * sizeof *c);
-  if (!c) return EP_ERR_MEMORY;
-  ep_descriptor(model, ep_state_q(s->state), c);
-  const ep_status status = ep_example_weights(s->state, c, out);
-  free(c);
-  return status;
+static ep_status note_weights(simulation *s, double *out, ep_error *err) {
+  ep_descriptor(s->model, ep_state_q(s->state), s->descriptor);
+  const ep_status status = ep_example_weights(s->state, s->descriptor, out);
+  if (status == EP_OK) return EP_OK;
+  return ep_fail(
+      err, status,
+      "step %d (t = %.4g s) is done, but its shape has no weights of the examples: it is "
+      "deformed too far; weaken the loads or take a smaller simulation.dt. What was "
+      "simulated before it is kept",
+      s->record->rows, s->record->rows * s->scene->dt);
 }
 
 // Note the state after a step: trajectory, weights, inverted tets.
-static ep_status note(simulation *s, const ep_mesh *mesh, double *x) {
+static ep_status note(simulation *s, const ep_mesh *mesh, ep_error *err) {
   ep_record *record = s->record;
   const size_t row = (size_t)record->rows, r = (size_t)s->model->size.r;
   memcpy(record->q + row * r, ep_state_q(s->state), r * sizeof *record->q);
@@ -74,9 +78,8 @@ static ep_status note(simulation *s, const ep_mesh *mesh, double *x) {
     memcpy(to + EP_CONTACT_FORCE, contact->force, sizeof contact->force);
   }
   if (record->weights) {
-    const ep_status status = note_weights(
-        s, record->weights + row * (size_t)(s->model->size.k + ep_model_regions(s->model)));
-    if (status != EP_OK) return status;
+    const size_t shapes = (size_t)(s->model->size.k + ep_model_regions(s->model));
+    EP_TRY(note_weights(s, record->weights + row * shapes, err));
   }
   if (record->green_weights) {
     const size_t k = (size_t)s->model->size.k;
@@ -84,8 +87,8 @@ static ep_status note(simulation *s, const ep_mesh *mesh, double *x) {
     memcpy(record->green_weights + row * k, ep_state_green_weights(s->state),
            k * sizeof *record->green_weights);
   }
-  ep_positions(s->model, ep_state_q(s->state), x);
-  const int inverted = ep_mesh_inverted(mesh, x, NULL);
+  ep_positions(s->model, ep_state_q(s->state), s->x);
+  const int inverted = ep_mesh_inverted(mesh, s->x, NULL);
   if (inverted > record->max_inverted) record->max_inverted = inverted;
   record->rows++;
   return EP_OK;
@@ -100,39 +103,49 @@ static void add_up(ep_record *record, const ep_advance *done) {
   if (done->touching > record->most_touching) record->most_touching = done->touching;
 }
 
-static ep_status one_step(simulation *s, const ep_mesh *mesh, double *x) {
+static ep_status step_failed(const simulation *s, ep_status status, ep_error *err) {
+  const int step = s->record->rows;
+  if (status == EP_ERR_NUMERIC)
+    return ep_fail(err, status,
+                   "step %d (t = %.4g s) failed even at 1/%d of the time step; weaken the loads, "
+                   "take a smaller simulation.dt or more damping. What was simulated is kept",
+                   step, step * s->scene->dt, 1 << EP_HALVINGS_MAX);
+  if (status == EP_ERR_MEMORY)
+    return ep_fail(err, status, "step %d: no memory. What was simulated is kept", step);
+  return ep_fail(err, status,
+                 "step %d: the run time cannot do what the scene asks for; this should have been "
+                 "refused before: please report it with the scene",
+                 step);
+}
+
+static ep_status one_step(simulation *s, const ep_mesh *mesh, ep_error *err) {
   const int step = s->record->rows - 1;
   const double dt = s->scene->dt;
   const ep_status status = ep_stepper_advance(s->stepper, step * dt, dt, true, &s->done);
   add_up(s->record, &s->done);
-  if (status != EP_OK) return status;
+  if (status != EP_OK) return step_failed(s, status, err);
   s->record->step_ms[step] = 1e3 * s->done.seconds;
   s->record->target_ms[step] = 1e3 * s->done.target_seconds;
   s->record->time[step + 1] = (step + 1) * dt;
-  return note(s, mesh, x);
+  return note(s, mesh, err);
 }
 
 static ep_status run_steps(simulation *s, const ep_mesh *mesh, ep_log *log, ep_error *err) {
-  double *x = malloc(3 * (size_t)mesh->nv * sizeof *x);
-  if (!x) return ep_fail(err, EP_ERR_MEMORY, "no memory for positions");
+  s->x = malloc(3 * (size_t)mesh->nv * sizeof *s->x);
+  if (s->record->weights) s->descriptor = malloc(3 * (size_t)s->model->size.m * sizeof *s->x);
+  ep_status status = s->x && (s->descriptor || !s->record->weights)
+                         ? EP_OK
+                         : ep_fail(err, EP_ERR_MEMORY, "no memory for positions");
   ep_progress_begin(log, "simulation", s->scene->steps);
-  ep_status status = note(s, mesh, x);
+  if (status == EP_OK) status = note(s, mesh, err);
   while (status == EP_OK && s->record->rows <= s->scene->steps) {
-    status = one_step(s, mesh, x);
+    status = one_step(s, mesh, err);
     ep_progress(log, s->record->rows - 1);
   }
   ep_progress_end(log);
-  free(x);
-  if (status == EP_OK) return EP_OK;
-  if (status != EP_ERR_NUMERIC)
-    return ep_fail(err, status,
-                   "step %d: the run time cannot do what the scene asks for; this should have been "
-                   "refused before: please report it with the scene",
-                   s->record->rows);
-  return ep_fail(err, status,
-                 "step %d (t = %.4g s) failed even at 1/%d of the time step; weaken the loads, "
-                 "take a smaller simulation.dt or more damping. What was simulated is kept",
-                 s->record->rows, s->record->rows * s->scene->dt, 1 << EP_HALVINGS_MAX);
+  free(s->x);
+  free(s->descriptor);
+  return status;
 }
 
 ep_status ep_simulate(const ep_scene *scene, const ep_shapes *shapes, const ep_model *model,
