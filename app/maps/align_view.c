@@ -139,8 +139,7 @@ static ep_status fill_view(map_view *v, ep_error *err) {
 }
 
 static ep_status draw_colors(const map_view *v, const char *path, ep_error *err) {
-  char label[2][100], title[240], note[sizeof v->map->quality.reasons + 16];
-  const char *reasons = v->map->quality.reasons;
+  char label[2][100], title[240], note[sizeof v->map->quality.reasons + 32];
   snprintf(label[0], sizeof label[0], "%s, coloured by its images", v->from_name);
   snprintf(label[1], sizeof label[1], "%s, coloured by position", v->to_name);
   snprintf(title, sizeof title, "%.70s -> %.70s: the map is %s", v->from_name, v->to_name,
@@ -161,10 +160,7 @@ static ep_status draw_colors(const map_view *v, const char *path, ep_error *err)
   view.width = 560;
   view.height = 460;
   view.title = title;
-  if (*reasons)
-    snprintf(note, sizeof note, "%s%s", reasons, v->map->quality.settle_from < 0 ? "" : " (dot)");
-  else
-    snprintf(note, sizeof note, "same colour where mapped%s", v->dots ? "; dots: landmarks" : "");
+  ep_map_note(&v->map->quality, v->dots, note, sizeof note);
   view.note = note;
   return ep_gallery_poses(path, &view, 2, item, 0, err);
 }

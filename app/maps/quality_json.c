@@ -6,6 +6,11 @@ const char *ep_verdict_name(ep_verdict verdict) {
   return verdict == EP_MAP_GOOD ? "good" : verdict == EP_MAP_DOUBTFUL ? "doubtful" : "bad";
 }
 
+void ep_map_note(const ep_map_quality *q, int dots, char *note, size_t size) {
+  const char *shown = !dots ? "" : q->landmarks ? "; dots: landmarks" : "; dot: this landmark";
+  snprintf(note, size, "%s%s", *q->reasons ? q->reasons : "same colour where mapped", shown);
+}
+
 static json_t *region_json(int index, const ep_region_quality *r) {
   json_t *object = json_object();
   if (!object) return NULL;

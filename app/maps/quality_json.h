@@ -16,6 +16,10 @@ json_t *ep_quality_json(const ep_map_quality *quality, const ep_mesh *from, cons
 void ep_quality_text(FILE *out, const char *name, const ep_map_quality *quality,
                      const ep_mesh *from, const ep_mesh *to);
 
+// What stands under the picture of a map that shows `dots` places on both shapes: the landmarks
+// given where there are any, else the one that would settle the frame, if there is one.
+void ep_map_note(const ep_map_quality *quality, int dots, char *note, size_t size);
+
 // {inverted_tets, inverted_before_repair, .., iterations}: a pose on the object's mesh.
 json_t *ep_pose_json(const ep_pose_quality *quality);
 // Regions of local examples: elements and errors of the cubature in each.
