@@ -14,7 +14,7 @@ static ep_status read_span(const ep_scene_reader *r, const char *key, const doub
   snprintf(part, sizeof part, "%.80s.until", key);
   EP_TRY(ep_read_number(r, part, given_until, 1e9, 0, 1e9, until));
   if (*until <= *from)
-    return ep_read_refuse(r, part, "it ends at %g s, before it begins at %g s", *until, *from);
+    return ep_read_refuse(r, part, "it ends at %g s, not after it begins at %g s", *until, *from);
   if (!ramp) return EP_OK;
   snprintf(part, sizeof part, "%.80s.ramp", key);
   EP_TRY(ep_read_number(r, part, given_ramp, 0, 0, 1e9, ramp));

@@ -8,8 +8,7 @@
 // libcyaml reads "3e5 Pa" as 3e5, "1,5" as 1 and "flase" as true. Here numbers must be numbers to
 // their end, and what is true or false one of true, yes, 1, enable, false, no, 0, disable (case
 // does not matter). The tree must fit the schema otherwise. overridden: places do not tell, values
-// of
-// --set are among them. Errors: EP_ERR_SCENE with the place and the key.
+// of --set are among them. Errors: EP_ERR_SCENE with the place and the key.
 ep_status ep_schema_check_values(ep_yaml *yaml, bool overridden, ep_error *err);
 
 // The dotted path of the schema's key nearest to `key` (itself, where it stands elsewhere), "[]"

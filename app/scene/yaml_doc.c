@@ -6,11 +6,21 @@
 
 enum { KEY_MAX = 256, DEPTH_MAX = 32, CHUNK = 4096 };
 
+// Whether character `at` of the text is a tab. libyaml counts characters, not bytes; a byte order
+// mark is none of them.
+static bool is_tab(const char *text, size_t size, size_t at) {
+  const bool marked = size >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0;
+  for (size_t i = marked ? 3 : 0; i < size; i++) {
+    const bool begins = ((unsigned char)text[i] & 0xc0) != 0x80; // else inside a UTF-8 character
+    if (begins && at-- == 0) return text[i] == '\t';
+  }
+  return false;
+}
+
 static ep_status syntax_error(const yaml_parser_t *parser, const char *name, const char *text,
                               size_t size, ep_error *err) {
   const char *problem = parser->problem ? parser->problem : "not YAML";
-  const size_t at = parser->problem_mark.index;
-  if (at < size && text[at] == '\t') problem = "a tab: YAML is indented by blanks";
+  if (is_tab(text, size, parser->problem_mark.index)) problem = "a tab: YAML is indented by blanks";
   return ep_fail(err, EP_ERR_SCENE, "%s:%zu:%zu: %s", name, parser->problem_mark.line + 1,
                  parser->problem_mark.column + 1, problem);
 }

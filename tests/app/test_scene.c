@@ -180,7 +180,9 @@ static void mistakes_are_named_with_their_place(void **state) {
   refused(HEAD "loads: [{gravity: [0, 0, 1], push: {file: held.txt, force: [0, 0, 1]}}]\n",
           "s.yaml:3:9", "one of gravity, push");
   refused(HEAD "loads: [{push: {file: held.txt, force: [0, 0, 1], from: 2, until: 1}}]\n",
-          "s.yaml:3", "before it begins");
+          "s.yaml:3", "ends at 1 s, not after it begins at 2 s");
+  refused(HEAD "loads: [{push: {file: held.txt, force: [0, 0, 1], from: 1, until: 1}}]\n",
+          "s.yaml:3", "ends at 1 s, not after it begins at 1 s");
   refused(HEAD "loads: [{push: {file: held.txt, force: [0, 0, 1], until: 1, ramp: 0.6}}]\n",
           "s.yaml:3", "do not fit");
   refused("schema: 1\nobject: {mesh: box.veg, material: {young: 1e5}}\n", "s.yaml:2", "all of");
@@ -224,6 +226,9 @@ static void what_was_meant_is_said(void **state) {
   refused("schema: 1\nobject: {}\n", "s.yaml:2", "object.mesh is missing");
   refused("object: {mesh: box.veg}\n", "s.yaml", ": schema is missing");
   refused("schema: 1\nobject:\n\tmesh: box.veg\n", "s.yaml:3:1", "a tab");
+  // places are counted in characters, of one byte and more
+  refused("schema: 1 # \xc3\xa4 \xe2\x82\xac\nobject:\n\tmesh: box.veg\n", "s.yaml:3:1", "a tab");
+  refused("schema: 1\r\nobject: {name: \xc3\xa4, \xe2\x82\xac: [}\n", "s.yaml:2:", "did not find");
 }
 
 static void overrides_are_checked_like_the_file(void **state) {
