@@ -1,5 +1,7 @@
 #include "seeds.h"
 
+#include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -12,15 +14,39 @@
 
 #include "base/log.h"
 
-static double from_environment(const char *name, double usual) {
+static const char *given(const char *name) {
   const char *text = getenv(name);
-  return text && *text ? strtod(text, NULL) : usual;
+  return text && *text ? text : NULL;
+}
+
+static void refuse(const char *name, const char *wanted) {
+  fail_msg("%s=%s: %s wanted", name, getenv(name), wanted);
+}
+
+static uint64_t whole_from(const char *name, uint64_t usual, uint64_t most) {
+  const char *text = given(name);
+  char *end;
+  if (!text) return usual;
+  errno = 0;
+  const unsigned long long value = strtoull(text, &end, 10);
+  if (*end || errno || value > most || text[0] < '0' || text[0] > '9')
+    refuse(name, "a whole number, none below 0");
+  return value;
+}
+
+static double seconds_from(const char *name) {
+  const char *text = given(name);
+  char *end;
+  if (!text) return 0;
+  const double value = strtod(text, &end);
+  if (*end || !(value >= 0)) refuse(name, "a number of seconds, none below 0");
+  return value;
 }
 
 seeds seeds_begin(int usual_count) {
-  const double seconds = from_environment("EP_PROPERTY_SECONDS", 0);
-  return (seeds){.first = (uint64_t)from_environment("EP_PROPERTY_SEED", 1),
-                 .count = (int)from_environment("EP_PROPERTY_COUNT", usual_count),
+  const double seconds = seconds_from("EP_PROPERTY_SECONDS");
+  return (seeds){.first = whole_from("EP_PROPERTY_SEED", 1, UINT64_MAX),
+                 .count = (int)whole_from("EP_PROPERTY_COUNT", (uint64_t)usual_count, INT_MAX),
                  .seconds = seconds,
                  .until = ep_seconds() + seconds};
 }

@@ -1,7 +1,8 @@
 // Which random cases a property test goes through, and how one that fails is done again alone:
-//   EP_PROPERTY_SEED=N     the first seed (default 1)
+//   EP_PROPERTY_SEED=N     the first seed, 0 to 2^64 - 1 (default 1)
 //   EP_PROPERTY_COUNT=N    how many, one after the other (default: a few seconds' worth)
 //   EP_PROPERTY_SECONDS=S  go on until then, whatever the count
+// Anything else ends the test.
 // A case is made of its seed alone: the same one on every machine.
 #ifndef EP_TESTS_PROPERTIES_SEEDS_H
 #define EP_TESTS_PROPERTIES_SEEDS_H
@@ -11,14 +12,13 @@
 
 #include "base/random.h"
 
-// The next seed, false at the end. at: 0 before the first call.
 typedef struct seeds {
-  uint64_t first, now;
-  int done, count;
+  uint64_t first, now; // now: the case at hand, after seeds_next
+  int done, count;     // cases begun
   double seconds, until;
 } seeds;
 seeds seeds_begin(int usual_count);
-bool seeds_next(seeds *s);
+bool seeds_next(seeds *s); // on to the next case; false at the end
 
 enum { WHY = 600 };
 // A property that does not hold: into why (WHY), false.

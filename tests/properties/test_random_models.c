@@ -310,7 +310,6 @@ static bool loads_change_momentum_by_their_impulse(baked_scene *b, ep_random *rn
   }
   ep_state_momentum(ep_stepper_state(s), after, angular);
   ep_stepper_close(s);
-  (void)none;
   return good &&
          (distance(after, expected) <= 1e-11 * size ||
           breaks(why, "momentum %g of %g", distance(after, none), distance(expected, none)));
