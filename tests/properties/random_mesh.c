@@ -287,8 +287,9 @@ static void turn_inside_out(int *tet) {
   tet[0] = tet[1], tet[1] = kept;
 }
 
-ep_mesh placed_mesh(const ep_mesh *mesh, const placement *at, double inverted, int *to,
-                    ep_mesh_findings *findings) {
+ep_mesh placed_mesh(const ep_mesh *mesh, const placement *at, double share, int *to,
+                    ep_mesh_findings *findings, int *inverted) {
+  int turned = 0;
   const size_t nv = (size_t)mesh->nv, nt = (size_t)mesh->nt;
   ep_random rng = ep_random_seed(at->numbering, 2);
   int *vertex = taken(nv * sizeof *vertex), *order = taken(nt * sizeof *order);
@@ -305,8 +306,11 @@ ep_mesh placed_mesh(const ep_mesh *mesh, const placement *at, double inverted, i
     int *out = tet + 4 * order[t];
     out[0] = vertex[from[0]];
     for (int i = 0; i < 3; i++) out[1 + i] = vertex[from[1 + (i + turn) % 3]];
-    if (chance(&rng, inverted)) turn_inside_out(out);
+    if (!chance(&rng, share)) continue;
+    turn_inside_out(out);
+    turned++;
   }
+  if (inverted) *inverted = turned;
   ep_mesh out;
   ep_error err = {0};
   if (ep_mesh_make(mesh->nv, x, mesh->nt, tet, mesh->name, &out, findings, &err) != EP_OK)

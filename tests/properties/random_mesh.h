@@ -55,9 +55,9 @@ placement at_home(void);
 placement draw_placement(ep_random *rng);
 void place_point(const placement *at, const double x[3], double out[3]);
 void place_vector(const placement *at, const double x[3], double out[3]); // without unit and t
-// Vertex i of the mesh becomes vertex to[i] (nv, or NULL). inverted: share of the tets turned
-// inside out (readers turn them back).
-ep_mesh placed_mesh(const ep_mesh *mesh, const placement *at, double inverted, int *to,
-                    ep_mesh_findings *findings);
+// Vertex i of the mesh becomes vertex to[i] (nv, or NULL). share: of the tets that are turned
+// inside out (readers turn them back); *inverted (or NULL): how many these are.
+ep_mesh placed_mesh(const ep_mesh *mesh, const placement *at, double share, int *to,
+                    ep_mesh_findings *findings, int *inverted);
 
 #endif

@@ -277,7 +277,7 @@ static void save_pose(const char *folder, const char *name, const random_solid *
                       const random_pose *pose, const placement *at) {
   ep_mesh mesh = solid_mesh(solid);
   if (pose) pose_points(solid, pose, mesh.nv, mesh.x);
-  ep_mesh placed = placed_mesh(&mesh, at, 0, NULL, NULL);
+  ep_mesh placed = placed_mesh(&mesh, at, 0, NULL, NULL, NULL);
   save(folder, name, &placed, NULL);
   ep_mesh_free(&placed);
   ep_mesh_free(&mesh);
@@ -321,7 +321,7 @@ static void save_object(const random_scene *s, const placement *at, const char *
   int *numbers_of = malloc(nv * sizeof *numbers_of);
   double *paint = calloc(nv, sizeof *paint);
   assert_true(numbers_of && paint);
-  ep_mesh placed = placed_mesh(&home, at, 0, numbers_of, NULL);
+  ep_mesh placed = placed_mesh(&home, at, 0, numbers_of, NULL, NULL);
   const double until = held_share * solid_length(&s->object);
   for (size_t v = 0; v < nv; v++) paint[numbers_of[v]] = home.x[3 * v] <= until;
   const ep_field field = {"paint", 1, paint};
