@@ -69,7 +69,7 @@ static json_t *fractions(const ep_model *model, const double *q, double *largest
   *largest = NAN;
   for (int i = 0; list && i < model->size.k; i++) {
     const double fraction = ep_example_fraction(model, q, i);
-    if (!(*largest >= fraction)) *largest = fraction;
+    *largest = fmax(*largest, fraction); // fmax passes NaN over
     json_array_append_new(list, ep_json_number(fraction));
   }
   return list;

@@ -27,7 +27,7 @@ static axis_sum sum_of(const ep_stress_report *report, int variant, int axis) {
     sum.outcomes[r->outcome]++;
     sum.newton_median = fmax(sum.newton_median, r->newton_median);
     if (r->newton_most > sum.newton_most) sum.newton_most = r->newton_most;
-    if (!(sum.growth >= r->growth)) sum.growth = r->growth;
+    sum.growth = fmax(sum.growth, r->growth); // fmax passes NaN over
   }
   return sum;
 }

@@ -14,7 +14,8 @@ typedef struct run {
   ep_stress_bench bench;
   ep_stress_result *result;
   double newton[STEPS], us[STEPS];
-  double energy, largest; // of the last step without load, and the most of any step
+  bool driven;            // an example force acts in the first steps
+  double energy, largest; // of the last step, and the most of any step
 } run;
 
 void ep_stress_result_free(ep_stress_result *result) {
@@ -73,6 +74,13 @@ static void check_refusal(run *w) {
   free(before);
 }
 
+// Is the energy of the step before this one to be compared with? Neither loads nor example force
+// acted in both, and implicit Euler takes energy away.
+static bool is_left_alone(const run *w, int step) {
+  const bool pushed = w->result->what.axis != EP_STRESS_START || w->driven;
+  return step > (pushed ? LOADED : 0) && w->bench.scene.integrator == EP_IMPLICIT_EULER;
+}
+
 static void take(run *w, int step, const ep_advance *done) {
   ep_stress_result *out = w->result;
   w->newton[step] = done->newton_iterations;
@@ -86,8 +94,8 @@ static void take(run *w, int step, const ep_advance *done) {
   const double energy =
       last->elastic_energy + last->green_energy + last->kinetic_energy + last->contact.energy;
   w->largest = fmax(w->largest, fabs(energy));
-  if (step > LOADED && w->largest > 0 && w->bench.scene.integrator == EP_IMPLICIT_EULER)
-    out->growth = fmax(step == LOADED + 1 ? -1 : out->growth, (energy - w->energy) / w->largest);
+  if (is_left_alone(w, step) && w->largest > 0)
+    out->growth = fmax(out->growth, (energy - w->energy) / w->largest); // fmax passes NaN over
   w->energy = energy;
 }
 
@@ -143,6 +151,7 @@ static void judge(run *w) {
 static ep_status steps(run *w, ep_error *err) {
   EP_TRY(ep_stress_begin(&w->bench, &w->result->what, err));
   w->result->inverted_start = ep_stress_inverted(&w->bench);
+  w->driven = ep_stepper_def(w->bench.stepper)->strength > 0;
   bool go_on = true;
   const int count = LOADED + (w->result->what.axis == EP_STRESS_START ? RECOVERY : FREE);
   for (int step = 0; step < count && go_on; step++) EP_TRY(one_step(w, step, &go_on, err));
