@@ -119,6 +119,7 @@ struct ep_state {
   int guards_soft;   // parabolas in place of walls (reduced/guard.h)
   int guards_over;   // guards with J < 0 at the beginning of the step
   ep_unfold unfold;  // the way out of a jam
+  int never_unfolds; // ep_unfold_never
   int has_target;    // a target was found before
   double dt_before;  // of the last step; 0: none, or q or v was written since
   ep_frame frame;    // free motion: reduced/frame.h; at the end of the last step

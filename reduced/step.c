@@ -60,7 +60,7 @@ static double inner_energy(ep_step_run *s, const double *x, double *g, double *h
   const ep_step_def *def = s->def;
   if (state->unfold.on) {
     s->pull = s->strains = 0;
-    s->cancelling = s->elastic = ep_unfold_energy(state, x, g, h, project);
+    s->cancelling = s->elastic = ep_unfold_energy(state, x, g, h);
     if (g) s->internal = sqrt(ep_dot(state->model->size.r, g, g));
     return s->elastic;
   }
@@ -94,6 +94,11 @@ static double inner_energy(ep_step_run *s, const double *x, double *g, double *h
   return s->elastic + s->pull + s->strains;
 }
 
+// [s] Factor of K0 in the damping.
+static double damping_stiffness(const ep_step_run *s) {
+  return fmax(s->def->damping_stiffness, s->state->unfold.viscosity);
+}
+
 // What follows the time step: inertia, damping, external forces; sum and gradient and Hessian (r x
 // r) go on from there.
 static double moving_energy(ep_step_run *s, double sum, const double *x, double *g, double *h) {
@@ -101,7 +106,7 @@ static double moving_energy(ep_step_run *s, double sum, const double *x, double 
   const ep_step_def *def = s->def;
   const int r = state->model->size.r;
   const double inertia = s->inertia, drag = def->damping_mass * s->rate;
-  const double viscous = def->damping_stiffness * s->rate;
+  const double viscous = damping_stiffness(s) * s->rate;
   const double *origin = s->free ? state->free_drift : state->base;
   if (viscous > 0) sum += 0.5 * viscous * add_k0(s, viscous, x, origin, g);
   for (int a = 0; a < r; a++) {
@@ -167,19 +172,27 @@ static void start_acceleration(ep_step_run *s) {
     def->outer(def->outer_user, state, &state->frame, state->q, state->outer_g, NULL, n);
     for (int a = 0; a < state->model->size.r; a++) state->g[a] += state->outer_g[a];
   }
-  if (def->damping_stiffness > 0) add_k0(s, def->damping_stiffness, state->v, NULL, state->g);
+  const double viscous = damping_stiffness(s);
+  if (viscous > 0) add_k0(s, viscous, state->v, NULL, state->g);
   for (int a = 0; a < state->model->size.r; a++)
     state->a[a] = (def->force ? def->force[a] : 0) - state->g[a] - def->damping_mass * state->v[a];
 }
 
-// What the integrator makes of the motion so far. Where the caller wrote q or v since the last
-// step, there is no motion before.
+// Where the caller wrote q or v since the last step there is no motion before; of another q it is
+// not known that it is turned over, or how it would unfold.
+static void notice_writing(ep_state *state) {
+  const size_t bytes = (size_t)state->model->size.r * sizeof *state->q;
+  const int wrote_q = memcmp(state->q, state->end_q, bytes) != 0;
+  if (wrote_q || memcmp(state->v, state->end_v, bytes) != 0) state->dt_before = 0;
+  if (!wrote_q) return;
+  state->guards_soft = 0;
+  state->unfold = (ep_unfold){0};
+}
+
+// What the integrator makes of the motion so far.
 static void predict(ep_step_run *s) {
   ep_state *state = s->state;
   const size_t r = (size_t)state->model->size.r;
-  if (memcmp(state->q, state->end_q, r * sizeof *state->q) != 0 ||
-      memcmp(state->v, state->end_v, r * sizeof *state->v) != 0)
-    state->dt_before = 0;
   if (s->def->integrator == EP_NEWMARK && state->dt_before == 0) start_acceleration(s);
   if (s->free) {
     ep_free_begin(&s->motion, state, s->def);
@@ -363,9 +376,9 @@ static int begin_guards(ep_step_run *s) {
   if (!state->guards_soft && !state->unfold.on) return 0;
   const int unfolds = state->unfold.on;
   state->unfold.on = 0;
-  inner_energy(s, state->q, state->g, NULL, 0);
+  const double energy = inner_energy(s, state->q, state->g, NULL, 0);
   state->unfold.on = unfolds;
-  return ep_unfold_begin(state, s->elastic + s->strains, state->g, is_loaded(s));
+  return ep_unfold_begin(state, energy, state->g, is_loaded(s));
 }
 
 ep_status ep_step(ep_state *state, const ep_step_def *given, ep_step_report *report) {
@@ -391,6 +404,7 @@ ep_status ep_step(ep_state *state, const ep_step_def *given, ep_step_report *rep
                       .max_iterations = def->max_iterations};
   ep_status status = find_target(&s, report);
   if (status != EP_OK) return status;
+  notice_writing(state);
   const ep_unfold before = state->unfold;
   const int calm = begin_guards(&s);
   predict(&s);

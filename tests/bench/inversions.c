@@ -2,8 +2,8 @@
 // after it was let go: inversions SCENE [--starts] [--set key=value ...]. One row a case: material,
 // held or free, the path of the examples, the share alpha, the loads times value (60 steps, then 60
 // without loads and example force) or the start state (60 steps, then 300 without example force);
-// the inverted at the start, the most at any time, those at the end. --starts: starts only, but in
-// both materials that keep elements from turning over, held and free.
+// the inverted at the start, the most at any time, those at the end, the steps that unfolded.
+// --starts: starts only, but in both materials that keep elements from turning over, held and free.
 #include <stdio.h>
 #include <string.h>
 
@@ -22,11 +22,11 @@ static ep_status one(const ep_session *session, const char *path, double alpha,
   char text[32];
   EP_TRY(ep_stress_run(session, c, &result, err));
   ep_stress_value_text(c, text);
-  printf("%-12s %-4s %-6s %5.2f %-6s %-9s %6d %6d %6d %7.3g %6d %9.2g %8.1f  %s %s\n",
+  printf("%-12s %-4s %-6s %5.2f %-6s %-9s %6d %6d %6d %6d %7.3g %6d %9.2g %8.1f  %s %s\n",
          ep_material_name(session->scene.model), session->scene.nfixed ? "held" : "free", path,
          alpha, ep_stress_axis_name(c->axis), text, result.inverted_start, result.inverted_most,
-         result.inverted_end, result.newton_median, result.halvings, result.growth, result.step_us,
-         ep_stress_outcome_name(result.outcome), result.why);
+         result.inverted_end, result.unfolded, result.newton_median, result.halvings, result.growth,
+         result.step_us, ep_stress_outcome_name(result.outcome), result.why);
   fflush(stdout);
   ep_stress_result_free(&result);
   return EP_OK;
@@ -78,8 +78,9 @@ static ep_status all_starts(ep_session *session, ep_error *err) {
 }
 
 static ep_status tables(ep_session *session, bool starts, ep_error *err) {
-  printf("%-12s %-4s %-6s %5s %-6s %-9s %6s %6s %6s %7s %6s %9s %8s\n", "material", "", "path",
-         "alpha", "axis", "value", "start", "most", "end", "Newton", "halved", "growth", "us");
+  printf("%-12s %-4s %-6s %5s %-6s %-9s %6s %6s %6s %6s %7s %6s %9s %8s\n", "material", "", "path",
+         "alpha", "axis", "value", "start", "most", "end", "unfold", "Newton", "halved", "growth",
+         "us");
   return starts ? all_starts(session, err) : sweep(session, true, err);
 }
 
