@@ -9,28 +9,29 @@
 
 typedef struct create_work {
   ep_elements *elements;
-  const double *u; // (r x 3 nv)
+  const ep_basis *basis;
 } create_work;
 
-// G[3 i + j][a] = sum over the four vertices of U_a,i(v) grad_j(v).
+void ep_element_rows(const ep_fem *fem, const ep_basis *basis, int e, double *g) {
+  const size_t r = (size_t)basis->r, width = 3 * (size_t)fem->mesh->nv;
+  const int *tet = fem->mesh->tet + 4 * (size_t)e;
+  const double *gradient = fem->gradient + 12 * (size_t)e;
+  for (size_t a = 0; a < r; a++)
+    for (int entry = 0; entry < 9; entry++) {
+      double sum = 0;
+      for (int v = 0; v < 4; v++)
+        sum += basis->u[a * width + 3 * (size_t)tet[v] + (size_t)(entry / 3)] *
+               gradient[3 * v + entry % 3];
+      g[(size_t)entry * r + a] = sum;
+    }
+}
+
 static void create_range(void *context, int piece, int from, int to) {
   (void)piece;
   const create_work *w = context;
-  const ep_fem *fem = w->elements->fem;
-  const size_t r = (size_t)w->elements->r, width = 3 * (size_t)fem->mesh->nv;
-  for (int e = from; e < to; e++) {
-    double *g = w->elements->g + (size_t)e * 9 * r;
-    const int *tet = fem->mesh->tet + 4 * (size_t)e;
-    const double *gradient = fem->gradient + 12 * (size_t)e;
-    for (size_t a = 0; a < r; a++)
-      for (int entry = 0; entry < 9; entry++) {
-        double sum = 0;
-        for (int v = 0; v < 4; v++)
-          sum += w->u[a * width + 3 * (size_t)tet[v] + (size_t)(entry / 3)] *
-                 gradient[3 * v + entry % 3];
-        g[(size_t)entry * r + a] = sum;
-      }
-  }
+  for (int e = from; e < to; e++)
+    ep_element_rows(w->elements->fem, w->basis, e,
+                    w->elements->g + (size_t)e * 9 * (size_t)w->elements->r);
 }
 
 ep_status ep_elements_create(const ep_fem *fem, const ep_basis *basis, ep_elements *out,
@@ -39,7 +40,7 @@ ep_status ep_elements_create(const ep_fem *fem, const ep_basis *basis, ep_elemen
   out->g = malloc(((size_t)out->nt * 9 * (size_t)out->r + 1) * sizeof *out->g);
   if (!out->g)
     return ep_fail(err, EP_ERR_MEMORY, "no memory for the gradients of %d elements", out->nt);
-  ep_parallel_ranges(out->nt, create_range, &(create_work){out, basis->u});
+  ep_parallel_ranges(out->nt, create_range, &(create_work){out, basis});
   return EP_OK;
 }
 

@@ -15,6 +15,9 @@ ep_status ep_elements_create(const ep_fem *fem, const ep_basis *basis, ep_elemen
                              ep_error *err);
 void ep_elements_free(ep_elements *elements);
 
+// g (9 x r) of one element: G[3 i + j][a] = sum over its four vertices of U_a,i(v) grad_j(v).
+void ep_element_rows(const ep_fem *fem, const ep_basis *basis, int e, double *g);
+
 // A training pose: the object at q, and what counts as its undeformed shape.
 typedef struct ep_pose {
   const double *q;         // (r)

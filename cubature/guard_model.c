@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cubature/forces.h"
 #include "cubature/parallel.h"
 #include "reduced/guard.h"
 
@@ -11,7 +12,15 @@
 // the pose itself leaves it, so that no guard stands between the object and an example.
 static const double wall_begins = 0.15, of_example = 0.5;
 static const double pi = 3.14159265358979323846;
-enum { STEPS_A_PERIOD = 24, HALVINGS = 4, POWER_ITERATIONS = 30 };
+enum { STEPS_A_PERIOD = 24, HALVINGS = 1, POWER_ITERATIONS = 30 };
+enum { WORTH_THREADS = 20000 }; // tets
+
+// It matters what turns over, not where exactly the object is.
+static const double tolerance = 1e-2;
+
+// Instead of the corotational law, which takes four times as long: as soft when far extended (an
+// StVK object would not get there), the same at small strains.
+static const ep_material stand_in = EP_STABLE_NEOHOOKEAN;
 
 // ---- set up ------------------------------------------------------------------------------------
 
@@ -20,7 +29,7 @@ static void *aligned(size_t bytes) {
 }
 
 static ep_status allocate(ep_guard_model *m, ep_error *err) {
-  const size_t most = (size_t)m->most, nt = (size_t)m->elements.nt;
+  const size_t most = (size_t)m->most, nt = (size_t)m->nt;
   const size_t width = 8 * (size_t)m->model.size.blocks;
   m->tet = malloc((most + 1) * sizeof *m->tet);
   m->number = aligned(most * sizeof *m->number);
@@ -32,11 +41,15 @@ static ep_status allocate(ep_guard_model *m, ep_error *err) {
   m->around = malloc(nt * sizeof(double));
   m->allowed = malloc(nt * sizeof(double));
   m->ratio = malloc(nt * sizeof(double));
+  m->rest = malloc(nt * sizeof(double));
+  m->x = malloc(3 * (size_t)m->fem->mesh->nv * sizeof(double));
+  m->before = malloc(2 * (size_t)m->basis->r * sizeof(double));
+  m->rows = malloc(9 * (size_t)m->basis->r * sizeof(double));
   ep_model largest = m->model;
   largest.size.guards = m->most;
   m->block = aligned(ep_state_bytes(&largest));
   if (m->tet && m->number && m->w && m->stiffness && m->limit && m->g && m->growth && m->around &&
-      m->allowed && m->ratio && m->block)
+      m->allowed && m->ratio && m->rest && m->x && m->before && m->rows && m->block)
     return EP_OK;
   return ep_fail(err, EP_ERR_MEMORY, "no memory for %d guards", m->most);
 }
@@ -55,14 +68,61 @@ static ep_status weigh(ep_guard_model *m, ep_error *err) {
   return EP_OK;
 }
 
+// Six times the volume of element e at positions x (nv x 3), negative where it is turned over.
+static double edges(const ep_guard_model *m, int e, const double *x) {
+  const int *tet = m->fem->mesh->tet + 4 * (size_t)e;
+  const double *o = x + 3 * (size_t)tet[0];
+  double d[9];
+  for (int i = 0; i < 3; i++)
+    for (int c = 0; c < 3; c++) d[3 * i + c] = x[3 * (size_t)tet[i + 1] + (size_t)c] - o[c];
+  return d[0] * (d[4] * d[8] - d[5] * d[7]) - d[1] * (d[3] * d[8] - d[5] * d[6]) +
+         d[2] * (d[3] * d[7] - d[4] * d[6]);
+}
+
+typedef struct look_work {
+  ep_guard_model *model;
+  const double *q;
+} look_work;
+
+static void place(void *context, int piece, int from, int to) {
+  (void)piece;
+  const look_work *w = context;
+  const ep_guard_model *m = w->model;
+  const size_t n3 = 3 * (size_t)m->fem->mesh->nv, first = 3 * (size_t)from, end = 3 * (size_t)to;
+  memcpy(m->x + first, m->fem->mesh->x + first, (end - first) * sizeof *m->x);
+  for (size_t a = 0; a < (size_t)m->basis->r; a++)
+    for (size_t i = first; i < end; i++) m->x[i] += w->q[a] * m->basis->u[a * n3 + i];
+}
+
+static void measure(void *context, int piece, int from, int to) {
+  (void)piece;
+  const look_work *w = context;
+  for (int e = from; e < to; e++)
+    w->model->ratio[e] = edges(w->model, e, w->model->x) * w->model->rest[e];
+}
+
+// J of all elements at q.
+static void look(ep_guard_model *m, const double *q) {
+  look_work work = {m, q};
+  if (m->nt < WORTH_THREADS) {
+    place(&work, 0, 0, m->fem->mesh->nv);
+    measure(&work, 0, 0, m->nt);
+    return;
+  }
+  ep_parallel_ranges(m->fem->mesh->nv, place, &work);
+  ep_parallel_ranges(m->nt, measure, &work);
+}
+
 static void allow(ep_guard_model *m) {
   const size_t r = (size_t)m->basis->r;
-  double f[9];
-  for (int e = 0; e < m->elements.nt; e++) {
-    double least = 1;
-    for (size_t i = 0; i < (size_t)m->basis->examples; i++)
-      least = fmin(least, ep_element_gradient(&m->elements, e, m->basis->example_q + i * r, f));
-    m->allowed[e] = least > 0 ? fmin(wall_begins, of_example * least) : 0;
+  for (int e = 0; e < m->nt; e++) {
+    m->rest[e] = 1 / edges(m, e, m->fem->mesh->x);
+    m->allowed[e] = wall_begins;
+  }
+  for (size_t i = 0; i < (size_t)m->basis->examples; i++) {
+    look(m, m->basis->example_q + i * r);
+    for (int e = 0; e < m->nt; e++)
+      m->allowed[e] = fmax(0, fmin(m->allowed[e], of_example * m->ratio[e]));
   }
 }
 
@@ -97,9 +157,9 @@ static ep_status create(ep_guard_model *m, const ep_cubature *cubature, ep_error
                                 .s = cubature->count,
                                 .tet = cubature->tet,
                                 .weight = cubature->weight};
-  EP_TRY(ep_elements_create(m->fem, m->basis, &m->elements, err));
   EP_TRY(ep_model_build(&parts, &m->memory, err));
   m->model = m->memory.model;
+  if (m->model.material == EP_COROTATIONAL) m->model.material = stand_in;
   m->model.size.rigid = 0; // what a free object does in its own frame is enough
   EP_TRY(allocate(m, err));
   EP_TRY(weigh(m, err));
@@ -118,14 +178,13 @@ static ep_status create(ep_guard_model *m, const ep_cubature *cubature, ep_error
 ep_status ep_guard_model_create(const ep_fem *fem, const ep_basis *basis,
                                 const ep_cubature *cubature, int most, ep_guard_model *out,
                                 ep_error *err) {
-  *out = (ep_guard_model){.fem = fem, .basis = basis, .most = most};
+  *out = (ep_guard_model){.fem = fem, .basis = basis, .nt = fem->mesh->nt, .most = most};
   const ep_status status = create(out, cubature, err);
   if (status != EP_OK) ep_guard_model_free(out);
   return status;
 }
 
 void ep_guard_model_free(ep_guard_model *m) {
-  ep_elements_free(&m->elements);
   ep_model_memory_free(&m->memory);
   free(m->tet);
   free(m->number);
@@ -137,6 +196,10 @@ void ep_guard_model_free(ep_guard_model *m) {
   free(m->around);
   free(m->allowed);
   free(m->ratio);
+  free(m->rest);
+  free(m->x);
+  free(m->before);
+  free(m->rows);
   free(m->block);
   *m = (ep_guard_model){0};
 }
@@ -146,18 +209,18 @@ void ep_guard_model_free(ep_guard_model *m) {
 bool ep_guard_model_add(ep_guard_model *m, int tet) {
   const int at = m->model.size.guards;
   const size_t r = (size_t)m->model.size.r, width = 8 * (size_t)m->model.size.blocks;
-  const double *g = m->elements.g + (size_t)tet * 9 * r;
   double *growth = m->growth + (size_t)(at / 8) * width;
   if (at == m->most || m->allowed[tet] == 0) return false;
+  ep_element_rows(m->fem, m->basis, tet, m->rows);
   m->tet[at] = m->number[at] = tet;
   m->w[at] = m->around[tet];
   m->stiffness[at] = EP_GUARD_STIFFNESS * fmax(m->fem->lambda[tet], m->fem->mu[tet]);
   m->limit[at] = m->allowed[tet];
-  ep_pack_cubature((int)r, 1, g, m->g + (size_t)at * 9 * width);
+  ep_pack_cubature((int)r, 1, m->rows, m->g + (size_t)at * 9 * width);
   if (at % 8 == 0) memset(growth, 0, width * sizeof *growth);
   for (size_t a = 0; a < r; a++) {
     double square = 0;
-    for (size_t c = 0; c < 9; c++) square += g[c * r + a] * g[c * r + a];
+    for (size_t c = 0; c < 9; c++) square += m->rows[c * r + a] * m->rows[c * r + a];
     growth[a] = fmax(growth[a], sqrt(square));
   }
   m->model.size.guards++;
@@ -183,39 +246,43 @@ static bool step(ep_guard_model *m, ep_step_def *def, double dt, int level) {
   return level < HALVINGS && step(m, def, dt / 2, level + 1) && step(m, def, dt / 2, level + 1);
 }
 
+ep_status ep_guard_model_back(ep_guard_model *m, ep_error *err) {
+  const size_t r = (size_t)m->model.size.r;
+  EP_TRY(ep_guard_model_begin(m, err));
+  memcpy(ep_state_q(m->state), m->before, r * sizeof *m->before);
+  memcpy(ep_state_velocity(m->state), m->before + r, r * sizeof *m->before);
+  return EP_OK;
+}
+
 bool ep_guard_model_step(ep_guard_model *m, const double *force) {
+  const size_t r = (size_t)m->model.size.r;
+  memcpy(m->before, ep_state_q(m->state), r * sizeof *m->before);
+  memcpy(m->before + r, ep_state_velocity(m->state), r * sizeof *m->before);
   ep_step_def def = ep_default_step();
   def.force = force;
   def.strength = 0;
-  def.tolerance = 1e-4;
+  def.tolerance = tolerance;
   return step(m, &def, m->dt, 0);
-}
-
-static void look(void *context, int piece, int from, int to) {
-  (void)piece;
-  ep_guard_model *m = context;
-  double f[9];
-  for (int e = from; e < to; e++)
-    m->ratio[e] = ep_element_gradient(&m->elements, e, ep_state_q(m->state), f);
 }
 
 int ep_guard_model_inverted(ep_guard_model *m) {
   int count = 0;
-  ep_parallel_ranges(m->elements.nt, look, m);
-  for (int e = 0; e < m->elements.nt; e++) {
+  look(m, ep_state_q(m->state));
+  for (int e = 0; e < m->nt; e++) {
     if (!isfinite(m->ratio[e])) return -1;
     count += m->ratio[e] <= 0 && m->allowed[e] > 0;
   }
   return count;
 }
 
-double ep_guard_model_reach(const ep_guard_model *m, const double *q, double *u) {
-  const size_t n3 = 3 * (size_t)m->fem->mesh->nv;
+double ep_guard_model_reach(ep_guard_model *m, const double *q) {
+  const ep_mesh *mesh = m->fem->mesh;
   double largest = 0;
-  memset(u, 0, n3 * sizeof *u);
-  for (size_t a = 0; a < (size_t)m->basis->r; a++)
-    for (size_t i = 0; i < n3; i++) u[i] += q[a] * m->basis->u[a * n3 + i];
-  for (size_t i = 0; i < n3; i += 3)
-    largest = fmax(largest, u[i] * u[i] + u[i + 1] * u[i + 1] + u[i + 2] * u[i + 2]);
+  look(m, q);
+  for (size_t i = 0; i < 3 * (size_t)mesh->nv; i += 3) {
+    double square = 0;
+    for (size_t c = i; c < i + 3; c++) square += pow(m->x[c] - mesh->x[c], 2);
+    largest = fmax(largest, square);
+  }
   return sqrt(largest);
 }

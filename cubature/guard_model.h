@@ -3,13 +3,12 @@
 #define EP_CUBATURE_GUARD_MODEL_H
 
 #include "cubature/cubature.h"
-#include "cubature/forces.h"
 #include "reduced/bake/model_build.h"
 
 typedef struct ep_guard_model {
-  const ep_fem *fem;     // borrowed
-  const ep_basis *basis; // borrowed
-  ep_elements elements;
+  const ep_fem *fem;      // borrowed
+  const ep_basis *basis;  // borrowed
+  int nt;                 // tets of the mesh
   ep_model_memory memory; // without guards, examples and rigid motion
   ep_model model;         // the same with the guards so far
   int most;
@@ -20,6 +19,10 @@ typedef struct ep_guard_model {
   double *around;  // (nt) volume around each element: the weight it would have
   double *allowed; // (nt) the limit it would have; 0: no guard (an example turns it over)
   double *ratio;   // (nt) J of all elements when last looked at
+  double *rest;    // (nt) 1 / determinant of the edges at rest
+  double *x;       // (3 nv) positions when last looked at
+  double *before;  // (2 r) coordinates and velocities at the beginning of the last step
+  double *rows;    // (9 x r) scratch
   void *block;     // of the state
   ep_state *state;
   double dt;        // [s] a part of the longest period
@@ -38,9 +41,11 @@ bool ep_guard_model_add(ep_guard_model *m, int tet);
 ep_status ep_guard_model_begin(ep_guard_model *m, ep_error *err);
 // One step under the generalised force (r); in halves where it fails. false: it fails all the same.
 bool ep_guard_model_step(ep_guard_model *m, const double *force);
+// To where the last step began, with the guards so far. Errors: EP_ERR_NUMERIC.
+ep_status ep_guard_model_back(ep_guard_model *m, ep_error *err);
 // Fills ratio; elements with J <= 0, those that are spared not counted. -1: not finite.
 int ep_guard_model_inverted(ep_guard_model *m);
-// Largest displacement of a vertex at q [length]; u (3 nv) is scratch.
-double ep_guard_model_reach(const ep_guard_model *m, const double *q, double *u);
+// Largest displacement of a vertex at q [length].
+double ep_guard_model_reach(ep_guard_model *m, const double *q);
 
 #endif

@@ -11,12 +11,15 @@
 // of 3; moderate ones come first and get their guards before the hardest ones do.
 static const double severity[] = {1, 10, 100, 1000};
 enum { SEVERITIES = sizeof severity / sizeof *severity };
-enum { PUSHED = 12, FREE = 24 }; // steps of a push, and after it
-enum { ROUNDS = 40 };            // of one push, with the guards it asked for
+// Steps of a push, and after it (of one that tests). Its force grows from step to step: what turns
+// over does so one after another, and the first guards spare others.
+enum { PUSHED = 8, FREE = 6, FREE_TESTED = 24 };
+// No push takes more than this share of all guards, so that some are left for the others.
+enum { SHARES = 10 };
 enum { STREAM_PUSHES = 201, STREAM_HELD_OUT };
 
 ep_guard_options ep_default_guard_options(void) {
-  return (ep_guard_options){.most = 256, .pushes = 8, .effort = 60000, .seed = 1};
+  return (ep_guard_options){.most = 256, .pushes = 16, .effort = 1000, .seed = 1};
 }
 
 void ep_guards_free(ep_guards *guards) {
@@ -33,8 +36,12 @@ typedef struct chooser {
   double *mass;          // (nv) lumped volumes
   double *u;             // (3 nv) scratch
   double *force, *start; // (r) of the push at hand
+  double *now;           // (r) its force in this step
   int *root, *worst;     // (nv) clusters: union-find over vertices, element with the least J
-  bool full, tired;
+  bool full;
+  long effort_end; // of the push at hand: evaluations and guards at which it ends
+  int guards_end;
+  int cut; // pushes that ended there
   ep_log *log;
   int done; // pushes
 } chooser;
@@ -81,7 +88,7 @@ static void solve_k0(const ep_guard_model *m, double *x) {
 
 // One or two patches, scaled by what they would do to a linear object.
 static void draw_push(chooser *c, double hard) {
-  const ep_guard_model *m = &c->model;
+  ep_guard_model *m = &c->model;
   const size_t r = (size_t)m->model.size.r, n3 = 3 * (size_t)m->fem->mesh->nv;
   memset(c->u, 0, n3 * sizeof *c->u);
   const int patches = 1 + ep_random_below(&c->rng, 2);
@@ -92,7 +99,7 @@ static void draw_push(chooser *c, double hard) {
   }
   memcpy(c->start, c->force, r * sizeof *c->start);
   solve_k0(m, c->start);
-  const double reach = ep_guard_model_reach(m, c->start, c->u);
+  const double reach = ep_guard_model_reach(m, c->start);
   const double wanted = hard * pow(10, ep_random_uniform(&c->rng) - 0.5);
   const double scale = reach > 0 ? wanted * ep_mesh_diagonal(m->fem->mesh) / reach : 0;
   for (size_t a = 0; a < r; a++) c->force[a] *= scale, c->start[a] = 0;
@@ -100,10 +107,10 @@ static void draw_push(chooser *c, double hard) {
 
 // No push, but a random state: vertices up to half a diagonal away.
 static void draw_start(chooser *c) {
-  const ep_guard_model *m = &c->model;
+  ep_guard_model *m = &c->model;
   const size_t r = (size_t)m->model.size.r;
   for (size_t a = 0; a < r; a++) c->start[a] = ep_random_normal(&c->rng), c->force[a] = 0;
-  const double reach = ep_guard_model_reach(m, c->start, c->u);
+  const double reach = ep_guard_model_reach(m, c->start);
   const double wanted = (0.1 + 0.4 * ep_random_uniform(&c->rng)) * ep_mesh_diagonal(m->fem->mesh);
   for (size_t a = 0; a < r && reach > 0; a++) c->start[a] *= wanted / reach;
 }
@@ -144,36 +151,55 @@ static int add_worst(chooser *c) {
   return added;
 }
 
-// Push and let go. With `stop`: ends where something is inverted while it is pushed, or is still
-// inverted at the end.
-static ep_status run(chooser *c, bool stop, outcome *out, ep_error *err) {
+static bool spent(const chooser *c) {
+  return c->model.evaluations >= c->effort_end || c->model.model.size.guards >= c->guards_end;
+}
+
+// One step. With `stop`, while it turns tets over: again from where it began, with more guards.
+// Returns whether the push goes on.
+static ep_status advance(chooser *c, bool stop, const double *force, outcome *out, bool *go_on,
+                         ep_error *err) {
+  ep_guard_model *m = &c->model;
+  for (;;) {
+    *go_on = ep_guard_model_step(m, force);
+    if (!*go_on) return EP_OK;
+    out->left = ep_guard_model_inverted(m);
+    *go_on = out->left >= 0 && !(stop && spent(c));
+    if (!*go_on) return EP_OK;
+    if (!stop || out->left == 0 || add_worst(c) == 0) break;
+    EP_TRY(ep_guard_model_back(m, err));
+  }
+  out->during = out->during > out->left ? out->during : out->left;
+  return EP_OK;
+}
+
+// Push and let go, or let go from a start. With `stop` nothing that a guard can keep from it turns
+// over while it is pushed and after it.
+static ep_status run(chooser *c, bool stop, int free, outcome *out, ep_error *err) {
   ep_guard_model *m = &c->model;
   *out = (outcome){0};
   EP_TRY(ep_guard_model_begin(m, err));
   const size_t r = (size_t)m->model.size.r;
-  bool started = false;
+  bool started = false, go_on = true;
   memcpy(ep_state_q(m->state), c->start, r * sizeof *c->start);
   for (size_t a = 0; a < r; a++) started |= c->start[a] != 0;
-  for (int step = 0; step < PUSHED + FREE; step++) {
+  for (int step = 0; step < PUSHED + free && go_on; step++) {
     const bool pushed = step < PUSHED && !started;
-    if (!ep_guard_model_step(m, pushed ? c->force : NULL)) return EP_OK;
-    if (!pushed && step != PUSHED + FREE - 1 && step % 6 != 0) continue;
-    out->left = ep_guard_model_inverted(m);
-    if (out->left < 0) return EP_OK;
-    out->during = out->during > out->left ? out->during : out->left;
-    if (stop && pushed && out->left > 0) return EP_OK;
+    for (size_t a = 0; a < r; a++) c->now[a] = c->force[a] * (step + 1) / PUSHED;
+    EP_TRY(advance(c, stop && !started, pushed ? c->now : NULL, out, &go_on, err));
   }
   return EP_OK;
 }
 
+// The push at hand until it leaves nothing turned over, or has had its share.
 static ep_status secure(chooser *c, ep_error *err) {
   outcome now;
-  for (int round = 0; round < ROUNDS; round++) {
-    c->tired = c->model.evaluations > c->options->effort;
-    if (c->tired) return EP_OK;
-    EP_TRY(run(c, true, &now, err));
-    if (now.left <= 0 || add_worst(c) == 0) return EP_OK;
-  }
+  c->effort_end = c->model.evaluations + c->options->effort;
+  c->guards_end = c->model.model.size.guards + (c->options->most + SHARES - 1) / SHARES;
+  do {
+    EP_TRY(run(c, true, FREE, &now, err));
+  } while (!spent(c) && now.left > 0 && add_worst(c) > 0);
+  c->cut += spent(c);
   return EP_OK;
 }
 
@@ -181,13 +207,13 @@ static ep_status secure(chooser *c, ep_error *err) {
 
 // Pushes of every severity that only test.
 static int held_out(const ep_guard_options *options) {
-  return (options->pushes + 3) / 4;
+  return (options->pushes + 7) / 8;
 }
 
 static ep_status push_all(chooser *c, ep_error *err) {
   c->rng = ep_random_seed(c->options->seed, STREAM_PUSHES);
   for (int hard = 0; hard < SEVERITIES; hard++)
-    for (int i = 0; i < c->options->pushes && !c->full && !c->tired; i++) {
+    for (int i = 0; i < c->options->pushes && !c->full; i++) {
       if (i % 6 == 5)
         draw_start(c);
       else
@@ -200,12 +226,11 @@ static ep_status push_all(chooser *c, ep_error *err) {
 
 static ep_status hold_out(chooser *c, ep_guards *out, ep_error *err) {
   outcome now;
-  const long effort = c->model.evaluations + c->options->effort / 4;
   c->rng = ep_random_seed(c->options->seed, STREAM_HELD_OUT);
   for (int hard = 0; hard < SEVERITIES; hard++)
-    for (int i = 0; i < held_out(c->options) && c->model.evaluations <= effort; i++) {
+    for (int i = 0; i < held_out(c->options); i++) {
       draw_push(c, severity[hard]);
-      EP_TRY(run(c, false, &now, err));
+      EP_TRY(run(c, false, FREE_TESTED, &now, err));
       ep_progress(c->log, ++c->done);
       out->tried++;
       out->left += now.left > 0;
@@ -229,14 +254,14 @@ static ep_status keep(chooser *c, ep_guards *out, ep_error *err) {
     return ep_fail(err, EP_ERR_MEMORY, "no memory for %zu guards", count);
   out->count = (int)count;
   out->full = c->full;
-  out->tired = c->tired;
+  out->cut = c->cut;
   memcpy(out->tet, m->tet, count * sizeof *out->tet);
   qsort(out->tet, count, sizeof *out->tet, by_number); // neighbours share a group in a step
   for (size_t i = 0; i < count; i++) {
     out->weight[i] = m->around[out->tet[i]];
     out->limit[i] = m->allowed[out->tet[i]];
   }
-  for (int e = 0; e < m->elements.nt; e++) out->spared += m->allowed[e] == 0;
+  for (int e = 0; e < m->nt; e++) out->spared += m->allowed[e] == 0;
   return EP_OK;
 }
 
@@ -244,11 +269,12 @@ static ep_status prepare(chooser *c, const ep_mesh *mesh, int r, ep_error *err) 
   const size_t nv = (size_t)mesh->nv;
   c->mass = malloc(nv * sizeof *c->mass);
   c->u = malloc(3 * nv * sizeof *c->u);
-  c->force = malloc(2 * (size_t)r * sizeof *c->force);
+  c->force = malloc(3 * (size_t)r * sizeof *c->force);
   c->root = malloc(2 * nv * sizeof *c->root);
   if (!c->mass || !c->u || !c->force || !c->root)
     return ep_fail(err, EP_ERR_MEMORY, "no memory to choose guards");
   c->start = c->force + r;
+  c->now = c->start + r;
   c->worst = c->root + nv;
   ep_mesh_vertex_volumes(mesh, c->mass);
   return EP_OK;

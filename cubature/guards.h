@@ -1,7 +1,9 @@
 // Which elements must be kept from turning over besides the cubature elements (reduced/guard.h):
-// constraint generation. The reduced model is pushed hard and let go, all elements of the mesh are
-// looked at after every step, and the worst of every cluster that turned over becomes a guard; the
-// same push is then done again, until nothing turns over or the guards are used up.
+// constraint generation. The reduced model is pushed harder and harder and let go, all elements of
+// the mesh are looked at after every step, and the worst of every cluster that turned over becomes
+// a guard; then the step is done again with it, until nothing turns over in it or this push has had
+// its share of the guards and of the effort. Time: at most 5 x pushes x effort evaluations of the
+// reduced energy or so, and looks (of the mesh) that are fewer; memory: some vectors of the mesh.
 #ifndef EP_CUBATURE_GUARDS_H
 #define EP_CUBATURE_GUARDS_H
 
@@ -10,7 +12,7 @@
 typedef struct ep_guard_options {
   int most;      // guards at most
   int pushes;    // of every severity
-  long effort;   // evaluations of the energy after which no push is tried; a quarter more to test
+  long effort;   // evaluations of the energy after which a push ends
   uint64_t seed; // pushes are drawn from it
 } ep_guard_options;
 ep_guard_options ep_default_guard_options(void);
@@ -22,7 +24,7 @@ typedef struct ep_guards {
   double *limit;         // (count) share of its volume below which it resists
   int spared;            // tets an example turns over itself: they are never guards
   bool full;             // more were wanted than `most`
-  bool tired;            // the effort was used up before all pushes were tried
+  int cut;               // pushes that had their share of guards or effort and left more to do
   int tried, left, most; // held-out pushes, those that left tets inverted once let go, the most
                          // inverted at any time of them
 } ep_guards;

@@ -13,11 +13,11 @@ static void tell(const ep_bake *bake) {
             "guards: all %d are used and tets still turned over when pushed hard; raise "
             "reduction.guards",
             g->count);
-  if (g->tired)
+  if (g->cut > 0)
     ep_notice(bake->log,
-              "guards: looking for them was ended early, its steps are hard for this "
-              "material; %d were found",
-              g->count);
+              "guards: %d pushes would have taken more than their share of the guards or of the "
+              "effort and were ended there",
+              g->cut);
   if (g->left > 0)
     ep_warn(bake->log,
             "guards: %d of %d pushes kept for a test left tets inverted once they ended; raise "

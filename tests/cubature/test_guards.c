@@ -63,7 +63,7 @@ static void test_repeatable_and_bounded(void **state) {
   fixture f;
   make_fixture(&f, 0, 1);
   ep_guards a = choose(&f, 200, 3), b = choose(&f, 200, 3), few = choose(&f, 5, 3);
-  ep_guards brief = choose_within(&f, 200, 3, 500);
+  ep_guards brief = choose_within(&f, 200, 3, 30);
   assert_true(a.count > 5 && a.count <= 200);
   assert_int_equal(a.count, b.count);
   assert_memory_equal(a.tet, b.tet, (size_t)a.count * sizeof *a.tet);
@@ -74,9 +74,9 @@ static void test_repeatable_and_bounded(void **state) {
     assert_true(a.weight[i] > 0 && a.limit[i] > 0 && a.limit[i] < 0.5);
   }
   assert_int_equal(few.count, 5);
-  assert_true(few.full && !few.tired);
+  assert_true(few.full);
   assert_int_equal(a.spared, 0);
-  assert_true(brief.tired && !brief.full && brief.count < a.count);
+  assert_true(brief.cut > a.cut && brief.count < a.count);
   ep_guards_free(&a);
   ep_guards_free(&b);
   ep_guards_free(&few);
@@ -95,7 +95,8 @@ static void test_examples_are_left_free(void **state) {
     double gradient[9];
     for (int j = 0; j < g.count; j++) {
       const double left = ep_element_gradient(&f.elements, g.tet[j], f.basis.example_q, gradient);
-      assert_true(left > 0 && g.limit[j] <= 0.5 * left);
+      // the stage has J from positions: round-off of 4 / (edge 0.4)
+      assert_true(left > 0 && g.limit[j] <= 0.5 * left + 1e-13);
       lowered += g.limit[j] < 0.15;
     }
     for (int e = 0; e < f.b.mesh.nt; e++)
