@@ -159,6 +159,14 @@ static ep_status check_at_least_zero(const char *name, const double *x, int64_t 
   return EP_OK;
 }
 
+// A guard's wall begins at this share of its volume.
+static ep_status check_shares(const char *name, const double *x, int64_t count, char *message) {
+  for (int64_t i = 0; i < count; i++)
+    if (!(x[i] > 0) || x[i] > 1)
+      return refuse_array(message, name, "holds a number that is not above 0 and at most 1");
+  return EP_OK;
+}
+
 static ep_status check_index(const char *name, const int32_t *x, int64_t count, int below,
                              char *message) {
   for (int64_t i = 0; i < count; i++)
@@ -228,7 +236,7 @@ static ep_status read_arrays(const ep_tensorfile *file, ep_model *model, char *m
   FIRST_FAILURE(check_index("guard_tet", model->guard_tet, guards, nt, message));
   FIRST_FAILURE(check_at_least_zero("guard_w", model->guard_w, guards, message));
   FIRST_FAILURE(check_at_least_zero("guard_stiffness", model->guard_stiffness, guards, message));
-  FIRST_FAILURE(check_at_least_zero("guard_limit", model->guard_limit, guards, message));
+  FIRST_FAILURE(check_shares("guard_limit", model->guard_limit, guards, message));
   FIRST_FAILURE(check_at_least_zero("guard_growth", model->guard_growth,
                                     (guards + 7) / 8 * 8 * blocks, message));
   FIRST_FAILURE(check_index("contact_vertex", model->contact_vertex, contacts, n, message));

@@ -21,11 +21,14 @@ ep_step_def ep_default_step(void) {
                        .max_iterations = 50};
 }
 
-static int finite_pulls(const ep_step_def *d) {
+static int valid_pulls(const ep_step_def *d) {
   double sum = d->gravity[0] + d->gravity[1] + d->gravity[2];
-  for (int i = 0; i < d->pulls; i++)
+  if (d->pulls < 0 || (d->pulls > 0 && !d->pull)) return 0;
+  for (int i = 0; i < d->pulls; i++) {
+    if (!d->pull[i].modes) return 0;
     for (int a = 0; a < 3; a++) sum += d->pull[i].force[a] + d->pull[i].at[a];
-  return d->pulls >= 0 && isfinite(sum);
+  }
+  return isfinite(sum);
 }
 
 int ep_step_def_valid(const ep_step_def *d) {
@@ -33,7 +36,7 @@ int ep_step_def_valid(const ep_step_def *d) {
          isfinite(d->damping_mass) && d->damping_stiffness >= 0 && isfinite(d->damping_stiffness) &&
          d->strength >= 0 && isfinite(d->strength) && d->relief >= 0 && d->relief <= 1 &&
          d->tolerance > 0 && isfinite(d->tolerance) && d->target_tolerance > 0 &&
-         isfinite(d->target_tolerance) && d->max_iterations > 0 && finite_pulls(d) &&
+         isfinite(d->target_tolerance) && d->max_iterations > 0 && valid_pulls(d) &&
          ep_contact_def_valid(d) && ep_green_valid(&d->green) &&
          ep_integrator_name(d->integrator) != NULL &&
          (d->example_force == EP_EXAMPLE_ENERGY || d->example_force == EP_EXAMPLE_LINEAR);

@@ -24,8 +24,9 @@ static ep_status no_memory(ep_error *err) {
 // than three spread vertices only the translation is removed.
 static ep_status bring_back(const ep_mesh *mesh, int count, const int *list, double *y,
                             ep_error *err) {
-  double *from = malloc(6 * (size_t)count * sizeof *from), *to = from + 3 * (size_t)count;
+  double *from = malloc(6 * (size_t)count * sizeof *from);
   if (!from) return no_memory(err);
+  double *to = from + 3 * (size_t)count;
   for (int i = 0; i < count; i++)
     for (int a = 0; a < 3; a++) {
       from[3 * i + a] = y[3 * (size_t)list[i] + (size_t)a];

@@ -67,7 +67,7 @@ static ep_status check_parts(const ep_model_parts *p, ep_error *err) {
   }
   for (int i = 0; i < p->guards; i++) {
     if (p->guard_tet[i] < 0 || p->guard_tet[i] >= p->fem->mesh->nt || !(p->guard_w[i] >= 0) ||
-        !(p->guard_limit[i] > 0) || !isfinite(p->guard_w[i] + p->guard_limit[i]))
+        !(p->guard_limit[i] > 0) || p->guard_limit[i] > 1 || !isfinite(p->guard_w[i]))
       return ep_fail(err, EP_ERR_ARGUMENT, "guard %d is tet %d with weight %g and limit %g", i,
                      p->guard_tet[i], p->guard_w[i], p->guard_limit[i]);
   }
@@ -357,14 +357,19 @@ static ep_status fill_gravity(builder *b, ep_error *err) {
   const size_t n = (size_t)b->size.n, r = (size_t)b->size.r;
   ep_csr mass = {0};
   EP_TRY(ep_fem_scalar_mass(b->parts->fem, &mass, err));
-  double *work = malloc(2 * n * sizeof *work), *weight = work + n;
-  for (size_t v = 0; work && v < n; v++) work[v] = 1;
-  if (work) ep_csr_multiply(&mass, 1, work, weight);
-  for (size_t i = 0; work && i < 3 * n * r; i++)
+  double *work = malloc(2 * n * sizeof *work);
+  if (!work) {
+    ep_csr_free(&mass);
+    return ep_fail(err, EP_ERR_MEMORY, "no memory for gravity");
+  }
+  double *weight = work + n;
+  for (size_t v = 0; v < n; v++) work[v] = 1;
+  ep_csr_multiply(&mass, 1, work, weight);
+  for (size_t i = 0; i < 3 * n * r; i++)
     b->a.gravity_modes[i % 3 * r + i / (3 * n)] += weight[i % (3 * n) / 3] * b->a.u[i];
   free(work);
   ep_csr_free(&mass);
-  return work ? EP_OK : ep_fail(err, EP_ERR_MEMORY, "no memory for gravity");
+  return EP_OK;
 }
 
 static int cubic_size(const ep_model_parts *p, ep_precision precision) {

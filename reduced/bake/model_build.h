@@ -31,7 +31,7 @@ typedef struct ep_model_parts {
   int guards;                         // reduced/guard.h; 0: none
   const int *guard_tet;               // (guards) element numbers
   const double *guard_w;              // (guards) weights, >= 0 [volume]
-  const double *guard_limit;          // (guards) shares of the volume, > 0
+  const double *guard_limit;          // (guards) shares of the volume, above 0, at most 1
   const ep_contact_tree *contact;     // surface of the basis' mesh and modes, NULL: no obstacles
 } ep_model_parts;
 

@@ -385,8 +385,12 @@ static void gravity_and_pushes_give_their_impulse(void **state) {
       modes[3 * i + k] = f.model->u[i * f.b.n3 + 3 * (size_t)(nv - 1) + k];
   }
   def.gravity[1] = 0;
-  def.pulls = 1;
+  def.pulls = 1; // without any, then one without its modes: refused
+  assert_int_equal(ep_step(f.state, &def, NULL), EP_ERR_ARGUMENT);
   def.pull = &pull;
+  pull.modes = NULL;
+  assert_int_equal(ep_step(f.state, &def, NULL), EP_ERR_ARGUMENT);
+  pull.modes = modes;
   double p[3], l[3], p0[3], l0[3], *x = vector_of(f.b.n3), impulse[3] = {0};
   ep_state_momentum(f.state, p0, l0);
   for (int n = 0; n < 60; n++) {

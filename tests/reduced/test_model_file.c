@@ -179,12 +179,19 @@ static void damaged_contents_are_refused(void **state) {
   (void)state;
   image a = written(2);
   double *u = array_of(&a, "u"), *w = array_of(&a, "cubature_w"), keep = u[4];
+  double *limit = array_of(&a, "guard_limit");
   int32_t *tets = array_of(&a, "tets");
   u[4] = NAN;
   refuse(a.bytes, a.size, "\"u\": not finite at element 4");
   u[4] = keep, keep = w[2], w[2] = -1;
   refuse(a.bytes, a.size, "\"cubature_w\": holds a negative");
-  w[2] = keep, tets[5] = 1000;
+  w[2] = keep, keep = limit[3];
+  static const double shares[] = {0, -0.1, 1.5};
+  for (int i = 0; i < 3; i++) {
+    limit[3] = shares[i];
+    refuse(a.bytes, a.size, "\"guard_limit\": holds a number that is not above 0 and at most 1");
+  }
+  limit[3] = keep, tets[5] = 1000;
   refuse(a.bytes, a.size, "\"tets\": holds an index out of range");
   free(a.bytes);
 }
