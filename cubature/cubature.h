@@ -12,7 +12,7 @@ typedef struct ep_cubature_options {
   int elements;     // s at most
   double tolerance; // stop at this training error (0: never)
   int poses;        // training poses; as many again / 2 held out
-  double amplitude; // largest vertex displacement of random poses over the diagonal (0.2)
+  double amplitude; // largest vertex displacement of random poses over the extent (0.2)
   uint64_t seed;
   int method;            // 0 greedy over all candidates, 1: 100 random candidates a round
   int curve_count;       // held-out error wanted at these sizes too

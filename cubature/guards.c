@@ -7,7 +7,7 @@
 #include "base/random.h"
 #include "cubature/guard_model.h"
 
-// Pushes that would move the object this many diagonals if it stayed linear, give or take a factor
+// Pushes that would move the object this many extents if it stayed linear, give or take a factor
 // of 3; moderate ones come first and get their guards before the hardest ones do.
 static const double severity[] = {1, 10, 100, 1000};
 enum { SEVERITIES = sizeof severity / sizeof *severity };
@@ -57,9 +57,9 @@ static void random_unit(ep_random *rng, double d[3]) {
 // A force spread over the mass within a ball about a vertex, added to u (nv x 3).
 static void add_patch(chooser *c, double *u) {
   const ep_mesh *mesh = c->model.fem->mesh;
-  const double diagonal = ep_mesh_diagonal(mesh);
+  const double extent = ep_mesh_extent(mesh);
   const double *centre = mesh->x + 3 * (size_t)ep_random_below(&c->rng, mesh->nv);
-  const double radius = diagonal * (0.05 + 0.3 * ep_random_uniform(&c->rng));
+  const double radius = extent * (0.05 + 0.3 * ep_random_uniform(&c->rng));
   double direction[3], total = 0;
   random_unit(&c->rng, direction);
   for (int pass = 0; pass < 2; pass++)
@@ -101,17 +101,17 @@ static void draw_push(chooser *c, double hard) {
   solve_k0(m, c->start);
   const double reach = ep_guard_model_reach(m, c->start);
   const double wanted = hard * pow(10, ep_random_uniform(&c->rng) - 0.5);
-  const double scale = reach > 0 ? wanted * ep_mesh_diagonal(m->fem->mesh) / reach : 0;
+  const double scale = reach > 0 ? wanted * ep_mesh_extent(m->fem->mesh) / reach : 0;
   for (size_t a = 0; a < r; a++) c->force[a] *= scale, c->start[a] = 0;
 }
 
-// No push, but a random state: vertices up to half a diagonal away.
+// No push, but a random state: vertices up to half an extent away.
 static void draw_start(chooser *c) {
   ep_guard_model *m = &c->model;
   const size_t r = (size_t)m->model.size.r;
   for (size_t a = 0; a < r; a++) c->start[a] = ep_random_normal(&c->rng), c->force[a] = 0;
   const double reach = ep_guard_model_reach(m, c->start);
-  const double wanted = (0.1 + 0.4 * ep_random_uniform(&c->rng)) * ep_mesh_diagonal(m->fem->mesh);
+  const double wanted = (0.1 + 0.4 * ep_random_uniform(&c->rng)) * ep_mesh_extent(m->fem->mesh);
   for (size_t a = 0; a < r && reach > 0; a++) c->start[a] *= wanted / reach;
 }
 

@@ -191,7 +191,7 @@ ep_status ep_poses_make(const ep_elements *elements, const ep_basis *basis, cons
   const size_t r = (size_t)elements->r;
   const int all = options->regions ? count + (count + 1) / 2 : count;
   pose_maker m = {.elements = elements, .basis = basis, .paths = paths, .options = options};
-  m.reach = options->amplitude * ep_mesh_diagonal(elements->fem->mesh);
+  m.reach = options->amplitude * ep_mesh_extent(elements->fem->mesh);
   m.rng = ep_random_seed(options->seed, stream);
   ep_status status = EP_OK;
   *out = (ep_pose_set){0};

@@ -40,7 +40,7 @@ void ep_lb_reconstruct(const ep_lb *lb, const double *d, double *u);
 typedef struct ep_pose_options {
   int m;                     // coefficients used, <= lb->m
   int iterations;            // about 100
-  double tolerance;          // stop when no vertex moves more than this times the diagonal
+  double tolerance;          // stop when no vertex moves more than this times the extent
   const unsigned char *held; // (n) vertices that stay at rest, or NULL
 } ep_pose_options;
 ep_pose_options ep_default_pose_options(void);

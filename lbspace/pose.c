@@ -35,7 +35,7 @@ static int any_held(const ep_mesh *mesh, const unsigned char *held) {
 
 static ep_status alternate(ep_pose_solver *s, const double *d, const ep_pose_options *o, double *u,
                            int *iterations, ep_error *err) {
-  const double enough = o->tolerance * ep_mesh_diagonal(s->mesh);
+  const double enough = o->tolerance * ep_mesh_extent(s->mesh);
   for (*iterations = 0; *iterations < o->iterations;) {
     double moved;
     EP_TRY(ep_pose_iterate(s, d, u, &moved, err));

@@ -76,6 +76,17 @@ void ep_mesh_centroid(const ep_mesh *mesh, const double *x, double centroid[3]) 
   for (int k = 0; k < 3; k++) centroid[k] = sum[k] / total;
 }
 
+double ep_mesh_extent(const ep_mesh *mesh) {
+  double centroid[3], largest = 0;
+  ep_mesh_centroid(mesh, mesh->x, centroid);
+  for (int v = 0; v < mesh->nv; v++) {
+    const double *x = mesh->x + 3 * (size_t)v;
+    const double d[3] = {x[0] - centroid[0], x[1] - centroid[1], x[2] - centroid[2]};
+    largest = fmax(largest, dot(d, d));
+  }
+  return 2 * sqrt(largest);
+}
+
 void ep_mesh_vertex_volumes(const ep_mesh *mesh, double *v) {
   memset(v, 0, (size_t)mesh->nv * sizeof *v);
   for (int e = 0; e < mesh->nt; e++) {

@@ -78,7 +78,14 @@ void ep_tet_volumes(const ep_mesh *mesh, const double *x, double *volume);
 // deformed to rest volume.
 int ep_mesh_inverted(const ep_mesh *mesh, const double *x, double *worst);
 void ep_mesh_bounds(const ep_mesh *mesh, double low[3], double high[3]);
-double ep_mesh_diagonal(const ep_mesh *mesh); // of the bounding box
+// Of the bounding box along the axes: for people and for tolerances. It changes as the mesh turns,
+// a bar's by up to 40 %.
+double ep_mesh_diagonal(const ep_mesh *mesh);
+// The size that results go by (amplitudes, the contact's lengths): twice the largest distance of a
+// vertex from the centroid. A box's is its diagonal. The same however the mesh stands, is turned
+// and numbered, and from mesh to mesh of one solid as far as they have its corners. The volume must
+// be positive.
+double ep_mesh_extent(const ep_mesh *mesh);
 // Volume-weighted centroid.
 void ep_mesh_centroid(const ep_mesh *mesh, const double *x, double centroid[3]);
 // Volume lumped to vertices (a quarter of each tet), into v (nv).

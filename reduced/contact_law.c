@@ -2,11 +2,11 @@
 
 #include <math.h>
 
-// A hundred times as stiff as the object over its own diagonal, begun at 0.2 % of it: what rests on
+// A hundred times as stiff as the object over its own extent, begun at 0.2 % of it: what rests on
 // a plane then sinks in by less than the thickness. It gets stiffer below 0.25 % (to four times of
 // which impacts may go).
 static const double stiffness_ratio = 100, thickness_share = 0.002, depth_share = 0.0025;
-static const double creep_share = 1e-3; // diagonals per second that count as sticking
+static const double creep_share = 1e-3; // extents per second that count as sticking
 
 static int at_least_zero(double x) {
   return x >= 0 && isfinite(x);
@@ -22,14 +22,14 @@ int ep_contact_def_valid(const ep_step_def *def) {
   return 1;
 }
 
-ep_contact_law ep_contact_choose(const ep_step_def *def, double unit, double diagonal, int hessian,
+ep_contact_law ep_contact_choose(const ep_step_def *def, double unit, double extent, int hessian,
                                  ep_contact_memory *memory) {
   const ep_contact_def *c = &def->contact;
   return (ep_contact_law){.stiffness = c->stiffness > 0 ? c->stiffness : stiffness_ratio * unit,
-                          .thickness = c->thickness > 0 ? c->thickness : thickness_share * diagonal,
-                          .depth = c->depth > 0 ? 0.25 * c->depth : depth_share * diagonal,
+                          .thickness = c->thickness > 0 ? c->thickness : thickness_share * extent,
+                          .depth = c->depth > 0 ? 0.25 * c->depth : depth_share * extent,
                           .damping = c->damping,
-                          .creep = creep_share * diagonal,
+                          .creep = creep_share * extent,
                           .dt = def->dt,
                           .careful = hessian && memory->hessians++ % 2 == 1};
 }

@@ -21,8 +21,8 @@ int ep_contact_def_valid(const ep_step_def *def);
 
 // hessian: one is to be evaluated. Every other one is careful: exact ones alone jump to and fro
 // between sliding and sticking, careful ones alone converge slowly (4 to 10 times as many steps).
-// unit: Young's modulus over the diagonal [Pa/m]; diagonal: of the object at rest.
-ep_contact_law ep_contact_choose(const ep_step_def *def, double unit, double diagonal, int hessian,
+// unit: Young's modulus over the extent [Pa/m]; extent: of the object at rest.
+ep_contact_law ep_contact_choose(const ep_step_def *def, double unit, double extent, int hessian,
                                  ep_contact_memory *memory);
 
 // Factor of the contact energy in the incremental potential. Newmark's average acceleration takes

@@ -54,7 +54,8 @@ typedef struct ep_model {
   // The exact one where the model has it (double before float). May be set to another the model has
   // the arrays of, before states are made.
   ep_evaluator evaluator;
-  double rest_scale; // diagonal of the rest bounding box [length]
+  double rest_scale; // extent of the rest shape: twice the largest distance of a vertex
+                     // from its centroid; a box's diagonal [length]
 #define X(type, name, d1, d2, d3) const ep_model_##type *name;
   EP_MODEL_ARRAYS(X)
 #undef X
@@ -188,9 +189,9 @@ typedef enum ep_example_force { EP_EXAMPLE_ENERGY, EP_EXAMPLE_LINEAR } ep_exampl
 // How obstacles resist (reduced/contact_point.h); 0: chosen. What rests sinks in by a part of the
 // thickness; the deeper, the stiffer, so that impacts end above `depth`.
 typedef struct ep_contact_def {
-  double stiffness; // pressure per depth [Pa/m]; 0: 100 times Young's modulus over the diagonal
-  double thickness; // contact begins at this distance [length]; 0: 0.2 % of the diagonal
-  double depth;     // bound of the penetration in impacts [length]; 0: 1 % of the diagonal
+  double stiffness; // pressure per depth [Pa/m]; 0: 100 times Young's modulus over the extent
+  double thickness; // contact begins at this distance [length]; 0: 0.2 % of the extent
+  double depth;     // bound of the penetration in impacts [length]; 0: 1 % of the extent
   double damping;   // of the normal motion [s]: pressure damping x stiffness x speed
 } ep_contact_def;
 

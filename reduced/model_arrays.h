@@ -96,7 +96,7 @@
   /* contact (reduced/contact.h), vertices in the tree's order: number in the mesh, position at */ \
   /* rest, area, rows of U; per node: first vertex, end, next node when passed over; ball at */   \
   /* rest, its centre's rows of U, growth of its radius by each |q_k|; Young's modulus over the */ \
-  /* diagonal [Pa/m] */                                                                           \
+  /* extent [Pa/m] */                                                                             \
   X(int32,  contact_vertex, contacts, 1, 1)                                                       \
   X(double, contact_x,     contacts, 3, 1)                                                        \
   X(double, contact_area,  contacts, 1, 1)                                                        \

@@ -37,20 +37,33 @@ static void find_parts(ep_pose_limits *l, int *parent) {
   }
 }
 
-// Vertices of the soft edge belong to the part nearest to them, counted in tets.
-static void spread_parts(ep_pose_limits *l, int *next) {
+static double square_distance(const ep_mesh *mesh, int a, int b) {
+  const double *x = mesh->x + 3 * (size_t)a, *y = mesh->x + 3 * (size_t)b;
+  return pow(x[0] - y[0], 2) + pow(x[1] - y[1], 2) + pow(x[2] - y[2], 2);
+}
+
+// A vertex of the soft edge that shares a tet with one of a part: it may belong to that part, too.
+static int reach_vertex(const ep_pose_limits *l, int from, int to, int *next, double *edge) {
+  if (l->part[from] < 0 || l->part[to] >= 0 || !(l->weight[to] < 1)) return 0;
+  const double length = square_distance(l->mesh, from, to);
+  if (!(length < edge[to])) return 0;
+  next[to] = l->part[from];
+  edge[to] = length;
+  return 1;
+}
+
+// Vertices of the soft edge belong to the part nearest to them, counted in tets, and of several as
+// near to the one at the shortest edge: numbers of vertices do not decide. edge (nv): scratch.
+static void spread_parts(ep_pose_limits *l, int *next, double *edge) {
   const ep_mesh *mesh = l->mesh;
+  for (int v = 0; v < mesh->nv; v++) edge[v] = HUGE_VAL;
   for (int changed = 1; changed;) {
     changed = 0;
     memcpy(next, l->part, (size_t)mesh->nv * sizeof *next);
-    for (int e = 0; e < mesh->nt; e++) {
-      const int *tet = mesh->tet + 4 * (size_t)e;
-      int part = -1;
-      for (int i = 0; i < 4; i++)
-        if (l->part[tet[i]] >= 0 && (part < 0 || l->part[tet[i]] < part)) part = l->part[tet[i]];
-      for (int i = 0; part >= 0 && i < 4; i++)
-        if (next[tet[i]] < 0 && l->weight[tet[i]] < 1) next[tet[i]] = part, changed = 1;
-    }
+    for (int e = 0; e < mesh->nt; e++)
+      for (int i = 0; i < 16; i++)
+        changed |= reach_vertex(l, mesh->tet[4 * (size_t)e + (size_t)(i / 4)],
+                                mesh->tet[4 * (size_t)e + (size_t)(i % 4)], next, edge);
     memcpy(l->part, next, (size_t)mesh->nv * sizeof *next);
   }
 }
@@ -68,17 +81,20 @@ static void find_edge(ep_pose_limits *l) {
 
 // ---- what stays --------------------------------------------------------------------------------
 
-static int largest_part(const ep_pose_limits *l, int *count) {
+// By volume. work (2 nv)
+static int largest_part(const ep_pose_limits *l, double *work) {
   int best = 0;
-  memset(count, 0, (size_t)l->parts * sizeof *count);
+  double *own = work, *sum = work + l->mesh->nv;
+  ep_mesh_vertex_volumes(l->mesh, own);
+  memset(sum, 0, (size_t)l->parts * sizeof *sum);
   for (int v = 0; v < l->mesh->nv; v++)
-    if (l->part[v] >= 0) count[l->part[v]]++;
+    if (l->part[v] >= 0) sum[l->part[v]] += own[v];
   for (int p = 1; p < l->parts; p++)
-    if (count[p] > count[best]) best = p;
+    if (sum[p] > sum[best]) best = p;
   return best;
 }
 
-static void choose_what_stays(const ep_shapes *shapes, ep_pose_limits *l, int *work) {
+static void choose_what_stays(const ep_shapes *shapes, ep_pose_limits *l, double *work) {
   for (int i = 0; i < shapes->nfixed; i++) {
     const int v = shapes->fixed[i];
     l->held[v] = 1;
@@ -106,16 +122,19 @@ ep_status ep_pose_limits_make(const ep_shapes *shapes, const double *weight, ep_
   out->held = calloc(nv, 1);
   out->anchor = calloc(nv, sizeof *out->anchor);
   int *work = malloc(nv * sizeof *work);
-  if (!out->part || !out->stays || !out->edge || !out->held || !out->anchor || !work) {
+  double *sizes = malloc(2 * nv * sizeof *sizes);
+  if (!out->part || !out->stays || !out->edge || !out->held || !out->anchor || !work || !sizes) {
     free(work);
+    free(sizes);
     ep_pose_limits_free(out);
     return no_memory(err);
   }
   find_parts(out, work);
-  spread_parts(out, work);
+  spread_parts(out, work, sizes);
   find_edge(out);
-  choose_what_stays(shapes, out, work);
+  choose_what_stays(shapes, out, sizes);
   free(work);
+  free(sizes);
   return EP_OK;
 }
 

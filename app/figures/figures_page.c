@@ -200,7 +200,7 @@ static void head(FILE *out, const ep_figures *all) {
         "step, t_interp the interpolation of the examples in it. Newton: iterations per step. "
         "Example: how far the object went from rest to an example, at most in the run and at its "
         "end. Penetration: "
-        "deepest, over the diagonal of the object. Inverted: most inverted tets after any step."
+        "deepest, over the extent of the object. Inverted: most inverted tets after any step."
         "</p>\n",
         out);
 }

@@ -388,7 +388,7 @@ void ep_summary_text(FILE *out, const json_t *report) {
   text_motion(out, report);
   const json_t *contact = json_object_get(report, "contact");
   if (contact)
-    fprintf(out, "contact: up to %.0f vertices touch; deepest %.3g m, %.2f %% of the diagonal\n",
+    fprintf(out, "contact: up to %.0f vertices touch; deepest %.3g m, %.2f %% of the extent\n",
             ep_json_get_number(contact, "touching"), ep_json_get_number(contact, "penetration"),
             100 * ep_json_get_number(contact, "penetration_share"));
   fprintf(out, "inverted tets: at most %.0f after any step\n",

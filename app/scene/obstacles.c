@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-// Rounding of boxes' edges over the object's diagonal.
+// Rounding of boxes' edges over the object's extent.
 static const double rounding_share = 0.01;
 
 void ep_obstacle_pose(const ep_scene_obstacle *obstacle, double t, ep_frame *out) {
@@ -18,13 +18,13 @@ void ep_obstacle_pose(const ep_scene_obstacle *obstacle, double t, ep_frame *out
   }
 }
 
-void ep_obstacles_make(const ep_scene *scene, double diagonal, ep_obstacle *out) {
+void ep_obstacles_make(const ep_scene *scene, double extent, ep_obstacle *out) {
   for (int i = 0; i < scene->nobstacles; i++) {
     const ep_scene_obstacle *o = &scene->obstacle[i];
     out[i] = (ep_obstacle){.kind = o->kind, .friction = o->friction};
     memcpy(out[i].size, o->size, sizeof o->size);
     if (o->kind == EP_OBSTACLE_BOX)
-      out[i].rounding = fmin(rounding_share * diagonal, 0.25 * ep_obstacle_inner_radius(&out[i]));
+      out[i].rounding = fmin(rounding_share * extent, 0.25 * ep_obstacle_inner_radius(&out[i]));
   }
   ep_obstacles_move(scene, 0, 0, out);
 }

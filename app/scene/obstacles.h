@@ -4,10 +4,10 @@
 
 #include "app/scene/scene.h"
 
-// Sizes and friction of the scene's obstacles, standing as at time 0. diagonal: of the object;
+// Sizes and friction of the scene's obstacles, standing as at time 0. extent: of the object;
 // edges of boxes are rounded by 1 % of it (at most a quarter of the box's smallest half length), so
 // that normals are continuous down to that depth. out (scene->nobstacles), caller-owned.
-void ep_obstacles_make(const ep_scene *scene, double diagonal, ep_obstacle *out);
+void ep_obstacles_make(const ep_scene *scene, double extent, ep_obstacle *out);
 // Their poses at the beginning and the end of a step.
 void ep_obstacles_move(const ep_scene *scene, double from, double to, ep_obstacle *out);
 // Pose of one obstacle at time t: world = c + R local (reduced/obstacle.h).

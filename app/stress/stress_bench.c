@@ -7,8 +7,8 @@
 #include "app/stress/stress.h"
 #include "base/random.h"
 
-// Largest speed an impulse of 1 gives [diagonals a second]; amplitude of a random start and
-// distance of a far one [diagonals].
+// Largest speed an impulse of 1 gives [extents a second]; amplitude of a random start and
+// distance of a far one [extents].
 static const double kick = 0.1, random_amplitude = 0.5, far_away = 3;
 
 static ep_status bake(const ep_session *base, ep_stress_bench *b, ep_error *err) {

@@ -216,8 +216,8 @@ static const char *const titles[EP_STRESS_AXES] = {
     "Density &times; value",
     "Time step [s]",
     "Loads &times; value",
-    "Start with a speed of value tenths of the diagonal a second",
-    "Start inverted, collapsed, random, three diagonals away",
+    "Start with a speed of value tenths of the extent a second",
+    "Start inverted, collapsed, random, three extents away",
     "Share alpha of the examples",
     "Strength of the example force"};
 

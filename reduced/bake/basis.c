@@ -12,7 +12,8 @@
 // Relative mass norm left of an example after the earlier ones are taken out, below which it adds
 // no direction: what would be normalised is then mostly round-off.
 static const double DEPENDENT = 1e-8;
-// Peak displacement of the first mode over the diagonal: the amplitude poses are trained for.
+// Largest displacement of a vertex in the first mode over the extent of the object: the amplitude
+// poses are trained for.
 static const double AMPLITUDE = 0.2;
 // Gram eigenvalues below this times the largest are round-off of the Gram product.
 static const double RANK = 1e-13;
@@ -106,8 +107,8 @@ static void add_examples(builder *b, int examples, const double *poses, ep_log *
 // lambda_1^2 / (lambda_i lambda_j)) but for the factor p_1: their form leaves it out, which makes
 // the balance between modes and derivatives depend on the unit of length.
 static void scale_modes(const builder *b, const ep_modes *modes, double *out) {
-  const double peak = ep_largest(b->n3, modes->mode);
-  const double p1 = AMPLITUDE * ep_mesh_diagonal(b->fem->mesh) / peak;
+  const double peak = ep_longest((size_t)modes->n, modes->mode);
+  const double p1 = AMPLITUDE * ep_mesh_extent(b->fem->mesh) / peak;
   const int l = modes->linear;
   for (int i = 0; i < l; i++) {
     const double pi = p1 * modes->omega2[0] / modes->omega2[i];

@@ -151,7 +151,7 @@ double ep_fem_contact_unit(const ep_fem *fem) {
     volume += fem->volume[e];
     sum += fem->volume[e] * mu * (3 * lambda + 2 * mu) / (lambda + mu);
   }
-  return sum / volume / ep_mesh_diagonal(fem->mesh);
+  return sum / volume / ep_mesh_extent(fem->mesh);
 }
 
 double ep_fem_energy(const ep_fem *fem, const double *u) {

@@ -27,7 +27,7 @@ ep_status ep_fem_create(const ep_mesh *mesh, ep_material model, int nmaterials,
                         ep_error *err);
 void ep_fem_free(ep_fem *fem);
 
-// Mean Young's modulus, by volume, over the diagonal [Pa/m]: the unit of the contact's stiffness.
+// Mean Young's modulus, by volume, over the extent [Pa/m]: the unit of the contact's stiffness.
 double ep_fem_contact_unit(const ep_fem *fem);
 
 // Displacement u (3 nv). Energy; internal force f = dW/du (3 nv); stiffness K = d2W/du2 on

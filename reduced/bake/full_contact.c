@@ -11,7 +11,7 @@ ep_status ep_full_contact_create(const ep_fem *fem, ep_full_contact **out, ep_er
   ep_full_contact *c = *out = calloc(1, sizeof *c);
   if (!c) return ep_fail(err, EP_ERR_MEMORY, "no memory for contact in the full space");
   c->mesh = fem->mesh;
-  c->diagonal = ep_mesh_diagonal(fem->mesh);
+  c->extent = ep_mesh_extent(fem->mesh);
   c->unit = ep_fem_contact_unit(fem);
   c->vertex = malloc(n * sizeof *c->vertex);
   c->area = malloc(n * sizeof *c->area);
@@ -73,7 +73,7 @@ static ep_contact_path path_of(const ep_full_contact *c, const ep_obstacle *o, i
 }
 
 static ep_contact_law law_of(ep_full_contact *c, const ep_step_def *def, bool hessian) {
-  return ep_contact_choose(def, c->unit, c->diagonal, hessian, &c->memory);
+  return ep_contact_choose(def, c->unit, c->extent, hessian, &c->memory);
 }
 
 double ep_full_contact_energy(ep_full_contact *c, const ep_step_def *def, const double *u,

@@ -11,7 +11,7 @@ typedef struct ep_full_contact {
   int count;
   int *vertex;                 // (count) on the surface, not held
   double *area;                // (count)
-  double unit, diagonal;       // as ep_contact_choose
+  double unit, extent;         // as ep_contact_choose
   double *start, *lag, *ahead; // (3n) displacements: step's start, normal forces, free flight
   ep_contact_memory memory;
 } ep_full_contact;

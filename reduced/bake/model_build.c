@@ -417,7 +417,7 @@ ep_status ep_model_build(const ep_model_parts *parts, ep_model_memory *out, ep_e
   if (parts->cubic) EP_TRY_GOTO(status, fill_cubic(&b, err), fail);
   out->model.size = b.size;
   out->model.material = parts->fem->model;
-  out->model.rest_scale = ep_mesh_diagonal(parts->fem->mesh);
+  out->model.rest_scale = ep_mesh_extent(parts->fem->mesh);
 #define X(type, name, d1, d2, d3) out->model.name = b.a.name;
   EP_MODEL_ARRAYS(X)
 #undef X

@@ -19,11 +19,12 @@
 #include "box.h"
 #include "program.h"
 
+// 12 modes: fewer cannot shorten the beam, and its collapse, projected on them, inverts nothing.
 static const char scene_text[] =
     "schema: 1\nname: beam\nobject: {mesh: beam.veg}\n"
     "fixed: [{box: {low: [-1, -1, -1], high: [0.01, 1, 1]}}]\n"
     "families: [{poses: [beam-bent.veg]}]\n"
-    "reduction: {eigenfunctions: 4, modes: 8, linear_modes: 5, path_samples: 1, elements: 24,\n"
+    "reduction: {eigenfunctions: 4, modes: 12, linear_modes: 5, path_samples: 1, elements: 24,\n"
     "  training_poses: 20, amplitude: 0.1}\n"
     "simulation: {damping: {mass: 0.5, stiffness: 0.05}}\n"
     "loads: [{push: {box: {low: [0.9, -1, -1], high: [2, 2, 2]}, force: [0, 2, 0]}}]\n";
@@ -91,11 +92,13 @@ static void all_tell_of_the_same_cases(void **state) {
   free(record);
 }
 
+#define NONE "[0,0,0,0,0,0,0,0,0,0,0,0]" // a number for each mode of the beam
+
 static void a_state_is_done_again(void **state) {
   (void)state;
   write_text("failure.json",
              "{\"variant\": \"scene\", \"axis\": \"load\", \"value\": 10, \"second\": 0, \"t\": 0,"
-             "\"loaded\": true, \"q\": [0,0,0,0,0,0,0,0], \"v\": [0,0,0,0,0,0,0,0]}");
+             "\"loaded\": true, \"q\": " NONE ", \"v\": " NONE "}");
   assert_int_equal(program("", "stress beam.yaml --replay failure.json --cache cache"), 0);
   char *said = text_of("out.txt");
   if (!strstr(said, "step done: ")) fail_msg("%s", said);
@@ -104,7 +107,7 @@ static void a_state_is_done_again(void **state) {
   assert_int_equal(program("", "stress beam.yaml --replay failure.json --cache cache"), 3);
   write_text("failure.json",
              "{\"variant\": \"scene\", \"axis\": \"load\", \"value\": 10, \"second\": 0, \"t\": 0,"
-             "\"loaded\": true, \"q\": [0,0], \"v\": [0,0,0,0,0,0,0,0]}");
+             "\"loaded\": true, \"q\": [0,0], \"v\": " NONE "}");
   assert_int_equal(program("", "stress beam.yaml --replay failure.json --cache cache"), 3);
 }
 

@@ -28,9 +28,29 @@ static void volumes_and_centroid_of_the_cube(void **state) {
     ASSERT_NEAR(high[k], 1, 0);
   }
   ASSERT_NEAR(ep_mesh_diagonal(&m), sqrt(3), round_off);
+  ASSERT_NEAR(ep_mesh_extent(&m), sqrt(3), round_off);
   assert_int_equal(f.components, 1);
   assert_int_equal(f.duplicate_vertices + f.degenerate_tets + f.unused_vertices, 0);
   assert_int_equal(f.first_duplicate, -1);
+  ep_mesh_free(&m);
+}
+
+// extent(u R x + t) = u extent(x), where the diagonal is not.
+static void the_extent_does_not_turn(void **state) {
+  (void)state;
+  const double R[9] = {0.36, 0.48, -0.8, -0.8, 0.6, 0, 0.48, 0.64, 0.6}, unit = 1e3;
+  ep_mesh m = make_cube(NULL);
+  for (int v = 0; v < m.nv; v++) m.x[3 * v] *= 4; // a bar
+  const double before = ep_mesh_extent(&m), diagonal = ep_mesh_diagonal(&m);
+  ASSERT_NEAR(before, sqrt(18), round_off);
+  for (int v = 0; v < m.nv; v++) {
+    double *x = m.x + 3 * v;
+    const double y[3] = {x[0], x[1], x[2]};
+    for (int i = 0; i < 3; i++)
+      x[i] = 5 + unit * (R[3 * i] * y[0] + R[3 * i + 1] * y[1] + R[3 * i + 2] * y[2]);
+  }
+  ASSERT_NEAR(ep_mesh_extent(&m) / unit, before, round_off);
+  assert_true(ep_mesh_diagonal(&m) / unit > 1.1 * diagonal);
   ep_mesh_free(&m);
 }
 
@@ -281,6 +301,7 @@ static void real_meshes_have_the_counts_their_authors_give(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(volumes_and_centroid_of_the_cube),
+      cmocka_unit_test(the_extent_does_not_turn),
       cmocka_unit_test(gradients_reproduce_linear_functions),
       cmocka_unit_test(surface_points_outward_and_is_closed),
       cmocka_unit_test(inverted_tets_are_turned_round),

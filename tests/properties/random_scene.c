@@ -559,3 +559,19 @@ int write_scene(const random_scene *s, const placement *at, const char *folder, 
   fclose(w.file);
   return w.piece;
 }
+
+void make_scene_smaller(random_scene *s, const char *folder,
+                        bool (*fails)(const random_scene *s, const char *folder, char *why),
+                        char *why) {
+  const placement home = at_home();
+  const int pieces = write_scene(s, &home, folder, NULL);
+  for (int i = 0; i < pieces && i < 64; i++) {
+    random_scene smaller = *s;
+    char other[WHY];
+    smaller.off |= (uint64_t)1 << i;
+    if (!fails(&smaller, folder, other)) continue;
+    *s = smaller;
+    memcpy(why, other, WHY);
+  }
+  fails(s, folder, why);
+}

@@ -76,4 +76,10 @@ placement draw_scene_placement(const random_scene *s, ep_random *rng);
 // has that may be left out. to (nv of the object, or NULL): as in placed_mesh.
 int write_scene(const random_scene *scene, const placement *at, const char *folder, int *to);
 
+// Leaves out one piece after the other as long as the scene still fails; why: of what is left,
+// which is in the folder at the end. fails: writes the scene into the folder, and says what fails.
+void make_scene_smaller(random_scene *s, const char *folder,
+                        bool (*fails)(const random_scene *s, const char *folder, char *why),
+                        char *why);
+
 #endif

@@ -4,8 +4,7 @@
 //   turning too, K by translation);
 //   rest stays at rest; free objects keep both momenta, and under gravity and pushes gain exactly
 //   sum dt F; energy without load never grows with implicit Euler; same steps, same bytes;
-//   a pressure all around is -p dV/dq: f_0 and B are the first and second derivative of the volume;
-//   the same scene placed elsewhere - unit, frame, numbering of all meshes - moves the same.
+//   a pressure all around is -p dV/dq: f_0 and B are the first and second derivative of the volume.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

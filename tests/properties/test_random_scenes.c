@@ -133,21 +133,9 @@ static bool same_again(const random_scene *s, const char *folder, char *why) {
   return same || breaks(why, "a second run leaves other bytes in %s", two);
 }
 
-// Leaves out one piece after the other as long as the scene still fails.
-static void make_smaller(random_scene *s, const char *folder, char *why) {
+static bool fails(const random_scene *s, const char *folder, char *why) {
   int code;
-  ep_random rng = ep_random_seed(s->seed, 6);
-  const placement at = draw_scene_placement(s, &rng);
-  const int pieces = write_scene(s, &at, folder, NULL);
-  for (int i = 0; i < pieces && i < 64; i++) {
-    random_scene smaller = *s;
-    char other[WHY];
-    smaller.off |= (uint64_t)1 << i;
-    if (run_once(&smaller, folder, other, &code)) continue;
-    *s = smaller;
-    memcpy(why, other, WHY);
-  }
-  run_once(s, folder, why, &code); // what is left in the folder
+  return !run_once(s, folder, why, &code);
 }
 
 static void scenes_end_well(void **state) {
@@ -159,7 +147,7 @@ static void scenes_end_well(void **state) {
     int code;
     snprintf(folder, sizeof folder, "scene-%llu", (unsigned long long)all.now);
     if (!run_once(&s, folder, why, &code)) {
-      make_smaller(&s, folder, why);
+      make_scene_smaller(&s, folder, fails, why);
       seed_fails("test_random_scenes", all.now, why);
     }
     how_often[code]++;
