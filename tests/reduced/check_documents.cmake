@@ -1,6 +1,7 @@
 cmake_policy(VERSION 3.22)
 # Documents that comments cite: each docs/NAME.md is there, and so is each section cited by name,
-# as in  docs/method.md "Free motion", "Contact". No other document is cited.
+# as in  docs/method.md "Free motion", "Contact". No other document is cited. And docs/results.md
+# explains every key of a run's summary.
 file(GLOB_RECURSE sources ${SOURCE}/align/*.[ch] ${SOURCE}/app/*.[ch] ${SOURCE}/base/*.[ch]
      ${SOURCE}/cubature/*.[ch] ${SOURCE}/examples/*.[ch] ${SOURCE}/lbspace/*.[ch]
      ${SOURCE}/linalg/*.[ch] ${SOURCE}/mesh/*.[ch] ${SOURCE}/reduced/*.[ch]
@@ -35,6 +36,26 @@ foreach(file ${sources})
 endforeach()
 if(sections LESS 10)
   list(APPEND failed "found only ${sections} cited sections: is this test still looking?")
+endif()
+# Every key of summary.json stands in the table of docs/results.md.
+file(READ ${SOURCE}/app/run/run.c text)
+file(READ ${SOURCE}/docs/results.md results)
+string(REGEX MATCHALL "json_object_set_new\\([ \n]*report,[ \n]*\"[a-z_]+\"" set "${text}")
+string(REGEX MATCHALL "json_pack\\(\"{s:[^)]*" packed "${text}") # objects within it
+set(keys 0)
+foreach(call ${set} ${packed})
+  string(REGEX MATCHALL "\"[a-z_]+\"" names "${call}")
+  foreach(name ${names})
+    string(REPLACE "\"" "" name ${name})
+    math(EXPR keys "${keys} + 1")
+    string(FIND "${results}" "`${name}`" at)
+    if(at LESS 0)
+      list(APPEND failed "docs/results.md does not explain `${name}` of summary.json")
+    endif()
+  endforeach()
+endforeach()
+if(keys LESS 30)
+  list(APPEND failed "found only ${keys} keys of summary.json: is this test still looking?")
 endif()
 if(failed)
   list(JOIN failed "\n" text)
