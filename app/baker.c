@@ -25,6 +25,7 @@ static ep_status copy_model(const char *from, const char *to, ep_error *err) {
 static ep_status command_bake(const ep_cli *cli, ep_session *session, ep_bake *bake,
                               ep_error *err) {
   char path[EP_PATH_MAX];
+  if (cli->out) EP_TRY(ep_output_place(cli->out, err));
   EP_TRY(ep_bake_model(bake, path, err));
   if (cli->out) EP_TRY(copy_model(path, cli->out, err));
   EP_TRY(ep_bake_poses(bake, err)); // for the report: a model in the cache does not ask for them

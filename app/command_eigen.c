@@ -136,6 +136,7 @@ ep_status ep_command_eigen(const ep_cli *cli, ep_error *err) {
   ep_mesh mesh = {0};
   ep_mesh_findings findings;
   ep_lb lb = {0};
+  if (cli->out) EP_TRY(ep_output_place(cli->out, err));
   EP_TRY(ep_mesh_read(cli->input, &mesh, &findings, &log, err));
   ep_status status = ep_mesh_require_sound(&mesh, &findings, false, err);
   if (status == EP_OK) {

@@ -112,6 +112,19 @@ ep_status ep_output_folder(const char *path, ep_error *err) {
   return access(path, W_OK | X_OK) == 0 ? EP_OK : io_error(err, "cannot write into folder", path);
 }
 
+ep_status ep_output_place(const char *path, ep_error *err) {
+  char folder[EP_PATH_MAX];
+  struct stat info;
+  EP_TRY(ep_path_folder(path, folder, err));
+  if (stat(path, &info) == 0 && S_ISDIR(info.st_mode))
+    return ep_fail(err, EP_ERR_IO, "%s is a folder; name a file in it", path);
+  if (stat(folder, &info) != 0) return io_error(err, "cannot write into folder", folder);
+  if (!S_ISDIR(info.st_mode))
+    return ep_fail(err, EP_ERR_IO, "cannot write %s: %s is no folder", path, folder);
+  return access(folder, W_OK | X_OK) == 0 ? EP_OK
+                                          : io_error(err, "cannot write into folder", folder);
+}
+
 ep_status ep_file_remove(const char *path, ep_error *err) {
   return unlink(path) == 0 || errno == ENOENT ? EP_OK : io_error(err, "cannot remove", path);
 }

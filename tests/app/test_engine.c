@@ -1,6 +1,7 @@
 // The run time in an engine (examples/drag.c, docs/engine.md). Claims: the model `bake --out`
-// leaves is the cache's to the byte; the example takes it, in C and as C++ with the same output,
-// and drags the picked vertex where its spring pulls; what is no model is refused with the reason.
+// leaves is the cache's to the byte, and where it cannot go is said before anything is baked; the
+// example takes it, in C and as C++ with the same output, and drags the picked vertex where its
+// spring pulls; what is no model is refused with the reason.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -37,7 +38,24 @@ static void the_model_is_copied(void **state) {
   assert_int_equal(shell("rm -rf baked"), 0); // one model only: that of an earlier version is none
   bake();
   assert_int_equal(shell("cmp baked/model-*.epm beam.epm"), 0);
-  assert_int_equal(program("", "bake beam.yaml -q --cache baked --out nowhere/beam.epm"), 2);
+}
+
+static void the_place_is_looked_at_before_the_bake(void **state) {
+  (void)state;
+  write_box("beam.veg", 6, 2, 2, 1.2, 0, 2e4);
+  write_box("beam-bent.veg", 6, 2, 2, 1.2, 0.2, 0);
+  write_text("beam.yaml", scene_text);
+  static const char *const bad[] = {"nowhere/beam.epm", "folder", "beam.yaml/beam.epm"};
+  assert_int_equal(shell("rm -rf early nowhere; mkdir -p folder"), 0);
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    assert_int_equal(program("", "bake beam.yaml -q --cache early --out %s", bad[i]), 2);
+    char *said = text_of("err.txt");
+    if (!strstr(said, i == 1 ? "folder is a folder" : i ? "beam.yaml is no folder" : "nowhere"))
+      fail_msg("%s", said);
+    free(said);
+  }
+  // nothing was baked, not even a first stage
+  assert_int_equal(shell("test -z \"$(find early -type f 2>/dev/null)\""), 0);
 }
 
 // Two seconds: the mouse has gone 0.4 diagonals up, the beam (bent against its stiffness) follows.
@@ -79,6 +97,7 @@ static void what_is_no_model_is_refused(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(the_model_is_copied),
+      cmocka_unit_test(the_place_is_looked_at_before_the_bake),
       cmocka_unit_test(the_example_drags),
       cmocka_unit_test(what_is_no_model_is_refused),
   };
