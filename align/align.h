@@ -82,9 +82,10 @@ typedef struct ep_map_quality {
   double coverage;                        // share of the example's volume hit by the map
   double cycle; // round trip rms / radius of gyration before the two maps were made inverse to each
                 // other, when they knew nothing of each other; -1 where not made
-  // Elastic refinement of the map together with its reverse: energy (volumes 1) and rms distortion,
-  // 0 where parts move rigidly. Where the round trip was long, plain nearest neighbours were
-  // refined too and the lower energy kept.
+  // Elastic refinement of the map together with its reverse: energy (volumes 1, without the
+  // landmarks' term) and rms distortion, 0 where parts move rigidly. Where the round trip was long
+  // and no landmarks were given, plain nearest neighbours were refined too and the lower energy
+  // kept.
   double energy, energy_other; // of the one kept, of the other; -1 where there was no other
   double distortion;
   bool from_nearest; // the plain neighbours were kept
@@ -144,15 +145,21 @@ typedef struct ep_map_options {
   int landmarks;               // at most EP_LANDMARKS_MAX
   const ep_landmark *landmark; // (landmarks), borrowed
   bool reflections;            // mirrored frames are candidates too
-  bool keep_frame; // the authored frame is known to be right: no other is tried, no doubt about it
+  bool keep_frame; // the authored frame is believed: the map starts from no other. Others are still
+                   // tried by the shapes alone, and one that fits far better makes a doubt
 } ep_map_options;
 ep_map_options ep_default_map_options(void);
 
-// Product-space matching with reframing (docs/method.md "Maps"). Uses up to 12 functions, between
-// shapes of one family 32 (or m), where the spaces hold them; the coupling residuals up to 2m of
-// `to`: compute spaces of max(20, 2m), of max(32, 2m) within a family. Errors: EP_ERR_ARGUMENT (m
-// larger than the spaces), EP_ERR_MATCH (component counts differ). A bad map is no error here: the
-// verdict says so, the caller decides.
+// Functions the spaces of a map's shapes should hold at least: between shapes matching raises to 12
+// (map.c), and the group of near-multiple eigenvalues it ends in should be whole; between poses of
+// one family it raises to 32.
+enum { EP_MAP_SPACE = 25, EP_MAP_SPACE_FAMILY = 32 };
+
+// Product-space matching with reframing (docs/method.md "Maps"). Uses the functions the spaces
+// hold, fewer where they are small; the coupling residuals up to 2m of `to`: compute spaces of
+// max(EP_MAP_SPACE, 2m), of max(EP_MAP_SPACE_FAMILY, 2m) within a family. Errors:
+// EP_ERR_ARGUMENT (m larger than the spaces), EP_ERR_MATCH (component counts differ). A bad map is
+// no error here: the verdict says so, the caller decides.
 ep_status ep_map_match(const ep_shape *from, const ep_shape *to, const ep_map_options *options,
                        ep_log *log, ep_map *out, ep_error *err);
 

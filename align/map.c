@@ -12,8 +12,8 @@ enum { FUNCTIONS_SHAPES = 12, FUNCTIONS_FAMILY = 20 };
 // Shapes of one family agree in their finer functions too. Mean error of nine maps rest <- pose
 // with 20, 30, 40, 60: .82, .64, .56, .48 per cent of the diagonal. Only the last rounds take them.
 // Coarse meshes do not resolve more than some 30: the pose of a car of 1,019 vertices had 3, 5, 13
-// inverted tets before repair with 20, 32, 40.
-enum { FINE_FAMILY = 32, FINE_STEP = 4 };
+// inverted tets before repair with 20, 32, 40. So EP_MAP_SPACE_FAMILY, by steps of
+enum { FINE_STEP = 4 };
 static const double REGION_WEIGHT = 2; // measured useful: 1 to 3
 // Of that in the elastic refinement, where images gather along the regions' borders: at the full
 // weight the energy of gorilla and letter-c is twice as high, at a quarter regions slip.
@@ -471,7 +471,7 @@ static ep_status check_shapes(const ep_shape *from, const ep_shape *to, const ep
 
 // Functions both sides can offer, as many as the recipe wants.
 static int functions_in_use(const ep_shape *from, const ep_shape *to, const ep_map_options *o) {
-  int k = o->same_family ? FINE_FAMILY : FUNCTIONS_SHAPES;
+  int k = o->same_family ? EP_MAP_SPACE_FAMILY : FUNCTIONS_SHAPES;
   if (k < o->m) k = o->m;
   if (k > from->lb->m) k = from->lb->m;
   return k > to->lb->m ? to->lb->m : k;

@@ -1,11 +1,8 @@
 // Stages on whole shapes: Laplace-Beltrami spaces, maps, poses on the object's mesh.
+#include "align/align.h"
 #include "app/plan/planner.h"
 #include "app/scene/landmarks.h"
 #include "app/scene/map_fields.h"
-
-// Matching raises the number of functions to 20 (align/match.c), between the rest shape and a pose
-// of one family to 32; coupling uses 2 m.
-enum { MATCH_FUNCTIONS = 25, MATCH_FAMILY = 32 };
 
 static int smaller(int a, int b) {
   return a < b ? a : b;
@@ -58,7 +55,7 @@ static void plan_eigen(ep_planner *p) {
                     : "same connectivity, and the Green-strain path needs no descriptors");
       continue;
     }
-    const int match = in_family_map(shapes, i) ? MATCH_FAMILY : MATCH_FUNCTIONS;
+    const int match = in_family_map(shapes, i) ? EP_MAP_SPACE_FAMILY : EP_MAP_SPACE;
     const int wanted = maps ? larger(match, 2 * m) : m;
     ep_stage *stage = ep_plan_add(p, EP_STAGE_EIGEN, shape->name, true, "%s",
                                   i      ? "its map to the object needs it"
