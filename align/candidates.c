@@ -238,13 +238,18 @@ ep_status ep_candidates_run(const ep_side *from, const ep_side *to, const ep_mat
   return status;
 }
 
+bool ep_candidates_repeats(const ep_candidates *c, int first, int which) {
+  static const double SAME_START = 10; // degrees
+  for (int i = first; i < which; i++)
+    if (ep_frame_between(c->frame[i].rotation, c->frame[which].rotation) < SAME_START) return true;
+  return false;
+}
+
 // Starts that need no trial: as one tried already, or much farther from the landmarks than another.
 static bool worth_trying(const ep_candidates *c, int which, double best_mark, const ep_side *from,
                          const ep_side *to) {
-  static const double SAME_START = 10; // degrees
   const ep_frame_candidate *f = &c->frame[which];
-  for (int i = 0; i < which; i++)
-    if (ep_frame_between(c->frame[i].rotation, f->rotation) < SAME_START) return false;
+  if (ep_candidates_repeats(c, 0, which)) return false;
   return !from->marks || mark_distance(from, to, f->rotation) <= 2 * best_mark + 0.3;
 }
 

@@ -2,7 +2,6 @@
 // vertex tells whether its partner is the right one. A landmark pulls its own map towards its
 // partner, right or wrong; a map without it is a witness.
 #include <float.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -73,22 +72,16 @@ static void forget(ep_side *copy) {
   free(copy->mark_near);
 }
 
-static double distance(const double *a, const double *b) {
-  double d2 = 0;
-  for (int c = 0; c < 3; c++) d2 += (a[c] - b[c]) * (a[c] - b[c]);
-  return sqrt(d2);
-}
-
 static void judge(const ep_side *to, int which, const double *image, ep_landmark_quality *out) {
   double least = DBL_MAX;
   int nearest = which;
   for (int a = 0; a < to->marks; a++) {
-    const double away = distance(image, to->mark_x + 3 * a) / to->radius;
+    const double away = ep_points_distance(image, to->mark_x + 3 * a) / to->radius;
     if (away >= least) continue;
     least = away;
     nearest = a;
   }
-  out->held_out = distance(image, to->mark_x + 3 * which) / to->radius;
+  out->held_out = ep_points_distance(image, to->mark_x + 3 * which) / to->radius;
   out->best_match = out->held_out > least + NEARER ? nearest : which;
 }
 

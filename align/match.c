@@ -25,9 +25,7 @@ typedef struct matcher {
   double *image;        // (from->n x max(k, 3)) values of `to` at p
   double *query, *target, *lead, *c, *d;
   double *pull, *gram, *marks; // landmarks: coefficients, their matrix, turned points of `to`
-  // While polishing: the points the map sends from's vertices to, in tets; NULL before
-  const int *tet;
-  const double *weight;
+  ep_point_map points;         // while polishing: the map, to points in tets; NULL before
 } matcher;
 
 static void free_matcher(matcher *w) {
@@ -141,20 +139,13 @@ ep_status ep_match_functional(const ep_side *from, const ep_side *to, const int 
 
 // image (from->n x width) = values (to->n x width) where the map sends from's vertices.
 static void pull(const matcher *w, const int *p, int width, const double *values, double *image) {
-  for (int i = 0; i < w->from->n; i++) {
-    double *out = image + (size_t)i * width;
-    if (!w->tet) {
-      memcpy(out, values + (size_t)p[i] * width, (size_t)width * sizeof *out);
-      continue;
-    }
-    const int *corner = w->to->shape->mesh->tet + 4 * (size_t)w->tet[i];
-    const double *b = w->weight + 4 * (size_t)i;
-    for (int c = 0; c < width; c++) {
-      double sum = 0;
-      for (int j = 0; j < 4; j++) sum += b[j] * values[(size_t)corner[j] * width + c];
-      out[c] = sum;
-    }
+  const size_t row = (size_t)width;
+  if (w->points.tet) {
+    ep_point_map_pull(&w->points, w->from->n, w->to->shape->mesh, width, values, image);
+    return;
   }
+  for (size_t i = 0; i < (size_t)w->from->n; i++)
+    memcpy(image + i * row, values + (size_t)p[i] * row, row * sizeof *image);
 }
 
 // y = b + Pi (x_e[p] - b), b the (warped) positions, Pi the projection on the constant and the
@@ -229,8 +220,7 @@ static ep_status polish(matcher *w, int *p, int *tet, double *weight, ep_error *
   const int d = w->rule->k + 3 + w->columns;
   const ep_mesh *mesh = w->to->shape->mesh;
   EP_TRY(ep_points_project(mesh, d, w->target, w->from->n, w->query, p, tet, weight, err));
-  w->tet = tet;
-  w->weight = weight;
+  w->points = (ep_point_map){p, tet, weight};
   for (int round = 0; round < POLISH_ROUNDS; round++) {
     EP_TRY(match_level(w, w->rule->k, p, err));
     EP_TRY(ep_points_project(mesh, d, w->target, w->from->n, w->query, p, tet, weight, err));

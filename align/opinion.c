@@ -1,7 +1,6 @@
 // A second opinion on a frame that landmarks, regions, the user or a family chose: what would the
 // shapes alone say? Landmarks and regions pull a map, so that its own figures flatter them; a frame
 // they turned over shows only where the shapes are matched without them.
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -34,13 +33,6 @@ static ep_status start_frames(const ep_side *from, const ep_side *to, ep_candida
   ep_candidates_add(c, c->frame[c->chosen].rotation, "as chosen");
   ep_candidates_add(c, identity, "authored");
   return ep_candidates_add_axes(c, from, to, false, err);
-}
-
-static bool tried(const ep_candidates *c, int first, int which) {
-  static const double SAME_START = 10; // degrees
-  for (int i = first; i < which; i++)
-    if (ep_frame_between(c->frame[i].rotation, c->frame[which].rotation) < SAME_START) return true;
-  return false;
 }
 
 // Whether candidate i contradicts the one at `first`, which is the choice seen alone. Where nobody
@@ -79,12 +71,6 @@ static void take_better(int first, ep_candidates *c) {
 
 // ---- exchanged partners ------------------------------------------------------------------------
 
-static double distance(const double *a, const double *b) {
-  double d2 = 0;
-  for (int c = 0; c < 3; c++) d2 += (a[c] - b[c]) * (a[c] - b[c]);
-  return sqrt(d2);
-}
-
 // Two landmarks of which each comes, by the map p of the shapes alone, near the other's partner.
 static void exchanged_marks(const ep_side *from, const ep_side *to, const int *p,
                             ep_candidates *c) {
@@ -93,8 +79,8 @@ static void exchanged_marks(const ep_side *from, const ep_side *to, const int *p
     for (int b = 0; b < a; b++) {
       const double *ia = to->x + 3 * (size_t)p[from->mark_near[a]], *pa = to->mark_x + 3 * a;
       const double *ib = to->x + 3 * (size_t)p[from->mark_near[b]], *pb = to->mark_x + 3 * b;
-      if (distance(ia, pa) < distance(ia, pb) + NEARER * to->radius ||
-          distance(ib, pb) < distance(ib, pa) + NEARER * to->radius)
+      if (ep_points_distance(ia, pa) < ep_points_distance(ia, pb) + NEARER * to->radius ||
+          ep_points_distance(ib, pb) < ep_points_distance(ib, pa) + NEARER * to->radius)
         continue;
       c->exchanged[0] = b;
       c->exchanged[1] = a;
@@ -105,7 +91,6 @@ static void exchanged_marks(const ep_side *from, const ep_side *to, const int *p
 static ep_status exchanged_regions(const ep_side *from, const ep_side *to,
                                    const ep_match_rule *rule, const int *p, ep_candidates *c,
                                    ep_error *err) {
-  static const double BETTER = 0.15; // Jaccard, as for suspects (quality.c)
   const int count = from->regions;
   double *overlap = malloc((size_t)count * count * sizeof *overlap);
   if (!overlap) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d regions", count);
@@ -114,7 +99,8 @@ static ep_status exchanged_regions(const ep_side *from, const ep_side *to,
     for (int b = 0; b < a; b++) {
       const double aa = overlap[a * count + a], ab = overlap[a * count + b];
       const double bb = overlap[b * count + b], ba = overlap[b * count + a];
-      if ((rule->use && !(rule->use[a] && rule->use[b])) || ab < aa + BETTER || ba < bb + BETTER)
+      if ((rule->use && !(rule->use[a] && rule->use[b])) || ab < aa + EP_REGION_CLEARLY ||
+          ba < bb + EP_REGION_CLEARLY)
         continue;
       c->exchanged[0] = b;
       c->exchanged[1] = a;
@@ -137,7 +123,7 @@ ep_status ep_candidates_second_opinion(const ep_side *from, const ep_side *to,
   EP_TRY(start_frames(&f, &t, c, err));
   for (int i = first; i < c->count; i++) {
     c->frame[i].alone = true;
-    if (tried(c, first, i))
+    if (ep_candidates_repeats(c, first, i))
       ep_candidates_drop(c, i--);
     else
       EP_TRY(ep_candidates_run(&f, &t, &alone, ROUNDS, c, i, err));

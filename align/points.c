@@ -2,6 +2,7 @@
 // product space, where it makes a map finer than its vertices (after Ezuz & Ben-Chen 2017,
 // "Deblurring and denoising of maps between shapes").
 #include <float.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -165,6 +166,12 @@ ep_status ep_point_map_from_vertices(int n, const ep_mesh *to, ep_point_map *map
   }
   free(corner);
   return EP_OK;
+}
+
+double ep_points_distance(const double a[3], const double b[3]) {
+  double d2 = 0;
+  for (int c = 0; c < 3; c++) d2 += (a[c] - b[c]) * (a[c] - b[c]);
+  return sqrt(d2);
 }
 
 void ep_point_map_pull(const ep_point_map *map, int n, const ep_mesh *to, int width,

@@ -37,7 +37,9 @@ ep_status ep_point_map_make(int n, ep_point_map *out, ep_error *err);
 void ep_point_map_free(ep_point_map *map);
 // tet and weight of the vertices p of `to`.
 ep_status ep_point_map_from_vertices(int n, const ep_mesh *to, ep_point_map *map, ep_error *err);
-// out (n x width) = values (to's vertices x width) at the images.
+// Distance of two points.
+double ep_points_distance(const double a[3], const double b[3]);
+// out (n x width) = values (to's vertices x width) at the images. Takes tet and weight only.
 void ep_point_map_pull(const ep_point_map *map, int n, const ep_mesh *to, int width,
                        const double *values, double *out);
 
@@ -145,7 +147,7 @@ double ep_match_cycle(const ep_side *from, const int *p, const int *back);
 
 // ---- elastic.c: both maps of a pair made smooth and inverse to each other.
 typedef struct ep_elastic_quality {
-  double energy;     // what was minimised, both ways (volumes 1): lower is the likelier map
+  double energy; // both ways (volumes 1), without the landmarks' term: lower is the likelier map
   double distortion; // rms of |grad y - R| both ways: 0 where every part moves rigidly
 } ep_elastic_quality;
 // In frame r (to's frame -> from's). there, back: in: maps of points; out: the refined ones.
@@ -189,6 +191,9 @@ ep_status ep_candidates_add_axes(ep_candidates *c, const ep_side *from, const ep
 ep_status ep_candidates_run(const ep_side *from, const ep_side *to, const ep_match_rule *rule,
                             int rounds, ep_candidates *c, int which, ep_error *err);
 void ep_candidates_drop(ep_candidates *c, int which);
+// Whether frame `which` is, but for a few degrees, one of those from `first` to the one before it:
+// both would end in the same map.
+bool ep_candidates_repeats(const ep_candidates *c, int first, int which);
 // Rms distance of the images of two maps over to's rms radius.
 double ep_candidates_difference(const ep_side *from, const ep_side *to, const int *p, const int *q);
 // A score is clearly better by this factor: right frames of shapes without symmetry were 1.5 to
@@ -237,6 +242,8 @@ ep_status ep_couple_choose(ep_coupling *def, int most, int q, const double *lamb
                            double *residual, ep_error *err);
 
 // ---- quality.c
+// Another region fits clearly better by this, of the overlap below.
+#define EP_REGION_CLEARLY 0.15
 // How well region h of `to`, pulled back by p, covers region g of `from`: volume of the common part
 // over that of the union. out (regions x regions), row g.
 ep_status ep_region_overlap(const ep_side *from, const ep_side *to, const int *p, double *out,

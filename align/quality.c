@@ -6,8 +6,8 @@
 #include "align/private.h"
 #include "linalg/dense.h"
 
-// A region is suspect where another fits by so much better, and its own partner hardly.
-static const double SUSPECT_MARGIN = 0.15, SUSPECT_JACCARD = 0.5, SUSPECT_WEIGHT = 0.1;
+// A region is suspect where another fits clearly better, and its own partner hardly.
+static const double SUSPECT_JACCARD = 0.5, SUSPECT_WEIGHT = 0.1;
 // Neighbouring eigenvalues closer than this (relative) may swap or mix between shapes.
 static const double NEAR_MULTIPLE = 0.03;
 // A vertex counts as hit within so many mean vertex distances of the coarser sampling.
@@ -46,7 +46,7 @@ void ep_region_suspects(int regions, const double *overlap, const unsigned char 
   for (int g = 0; g < regions; g++) {
     const double *row = overlap + (size_t)g * regions;
     best[g] = best_of(regions, row, NULL);
-    if (row[best[g]] <= row[g] + SUSPECT_MARGIN) best[g] = g;
+    if (row[best[g]] <= row[g] + EP_REGION_CLEARLY) best[g] = g;
     suspect[g] = (use && !use[g]) || (best[g] != g && row[g] < SUSPECT_JACCARD);
   }
   // Regions overlap: a misplaced one may fit the partner of another region best. Swapped partners
