@@ -22,6 +22,17 @@ static const double COVERAGE_DOUBTFUL = 0.65, COVERAGE_BAD = 0.3;
 // Poses of one family turn by up to 57 degrees: a larger turn may be wrong.
 static const double FRAME_DOUBTFUL_FAMILY = 60;
 
+enum { NUMBER = 32 };
+
+// A measure and what is wanted of it, in as few digits, two and more, as tell them apart.
+static void print_apart(double value, double limit, char text[2][NUMBER]) {
+  for (int digits = 2; digits < 9; digits++) {
+    snprintf(text[0], NUMBER, "%.*f", digits, value);
+    snprintf(text[1], NUMBER, "%.*f", digits, limit);
+    if (strcmp(text[0], text[1]) != 0) return;
+  }
+}
+
 // One measure against its two thresholds; high: large values are bad.
 static void weigh(ep_map_quality *q, const char *what, double value, double doubtful, double bad,
                   bool high, const char *advice) {
@@ -31,8 +42,10 @@ static void weigh(ep_map_quality *q, const char *what, double value, double doub
   const ep_verdict verdict = is_bad ? EP_MAP_BAD : EP_MAP_DOUBTFUL;
   if (verdict > q->verdict) q->verdict = verdict;
   const size_t used = strlen(q->reasons);
-  snprintf(q->reasons + used, sizeof q->reasons - used, "%s%s %.2f (%s %.2f wanted); %s",
-           used ? "; " : "", what, value, high ? "at most" : "at least", doubtful, advice);
+  char number[2][NUMBER];
+  print_apart(value, doubtful, number);
+  snprintf(q->reasons + used, sizeof q->reasons - used, "%s%s %s (%s %s wanted); %s",
+           used ? "; " : "", what, number[0], high ? "at most" : "at least", number[1], advice);
 }
 
 static const char *file_name(const ep_mesh *mesh) {
@@ -120,6 +133,16 @@ static void weigh_exchanged(ep_map_quality *q) {
            q->exchanged_with + 1);
 }
 
+// Half of the regions or more contradict the map.
+static void weigh_agreement(ep_map_quality *q, int agree) {
+  if (!q->regions || 2 * agree > q->regions) return;
+  if (q->verdict == EP_MAP_GOOD) q->verdict = EP_MAP_DOUBTFUL;
+  const size_t used = strlen(q->reasons);
+  snprintf(q->reasons + used, sizeof q->reasons - used,
+           "%s%d of %d regions agree with the map (more than half wanted): check their order",
+           used ? "; " : "", agree, q->regions);
+}
+
 void ep_map_note_inverted(ep_map *map, int inverted, int left) {
   map->quality.inverted = inverted;
   map->quality.inverted_left = left;
@@ -161,9 +184,7 @@ void ep_map_verdict(const ep_mesh *from, const ep_mesh *to, bool same_family, ep
     jaccard += q->region[g].jaccard;
     used++;
   }
-  if (q->regions && 2 * used <= q->regions)
-    weigh(q, "share of regions that agree", (double)used / q->regions, 0.5 + 1e-9, 0, false,
-          "half of the regions contradict the map: check their order");
+  weigh_agreement(q, used);
   if (used)
     weigh(q, "mean Jaccard of regions", jaccard / used, JACCARD_DOUBTFUL, JACCARD_BAD, false,
           "check the regions' order and the example's pose");
