@@ -388,13 +388,12 @@ static ep_status refine(const job *j, ep_trial *t, fine_map *out, ep_error *err)
   return refine_elastically(j, t, out, err);
 }
 
-// The trial, or the other one where there is one and its refined map has the lower energy.
+// The trial, or the other one where there is one and its refined map has the lower energy. The
+// record and the verdict tell of the one kept.
 static ep_status refine_best(job *j, ep_trial *t, fine_map *out, ep_map_quality *q, ep_error *err) {
   fine_map second = {0};
   EP_TRY(refine(j, t, out, err));
   q->energy_other = -1;
-  q->cycle = t->cycle; // the shorter round trip of the two: what the verdict's thresholds know
-  q->handed = out->handed;
   if (j->other.p) {
     const ep_status status = refine(j, &j->other, &second, err);
     if (status == EP_OK && second.elastic.energy < out->elastic.energy) {
@@ -409,6 +408,8 @@ static ep_status refine_best(job *j, ep_trial *t, fine_map *out, ep_map_quality 
     free_fine(&second);
     EP_TRY(status);
   }
+  q->cycle = t->cycle;
+  q->handed = out->handed;
   q->from_nearest = t->plain;
   q->energy = out->elastic.energy;
   q->distortion = out->elastic.distortion;
