@@ -117,14 +117,21 @@ static void add_term(const ep_kernel_task *t, const ep_kernel_term *term, int fi
   for (int c = 0; tangent && c < 81; c++) tangent[c] += w * h[c];
 }
 
+// Elements of one group whose stress and tangent are to be summed. `all` is known where it is
+// compiled: the loops of the material are those over consecutive elements.
+typedef struct acting {
+  int all, count, element[EP_LANES]; // from `first` on
+} acting;
+
 // f += G^T P for the elements of one group, three chains of additions.
-static void add_force(const ep_kernel_task *t, int first, const lane stress[9]) {
-  const int count = t->s - first < EP_LANES ? t->s - first : EP_LANES;
+LANE_INLINE void add_force(const ep_kernel_task *t, int first, const acting *on,
+                           const lane stress[9]) {
   lane *f = (lane *)t->f;
   for (int i = 0; i < t->blocks * PARTS; i++) {
     const int b = i / PARTS, p = i % PARTS;
     part *out = (part *)(f + b) + p, chain[3] = {*out, part_all(0), part_all(0)};
-    for (int e = 0; e < count; e++) {
+    for (int j = 0; j < on->count; j++) {
+      const int e = on->all ? j : on->element[j];
       const lane *g =
           (const lane *)t->g + ((size_t)(first + e) * (size_t)t->blocks + (size_t)b) * 9;
       const double *x = (const double *)stress + e;
@@ -134,14 +141,14 @@ static void add_force(const ep_kernel_task *t, int first, const lane stress[9]) 
   }
 }
 
-// B = H G (element, block, 9 rows) for one group.
-static void tangent_times_modes(const ep_kernel_task *t, int first, const lane *tangent,
-                                lane *out) {
-  const int count = t->s - first < EP_LANES ? t->s - first : EP_LANES;
-  for (int e = 0; e < count; e++) {
+// B = H G (acting element, block, 9 rows) for one group.
+LANE_INLINE void tangent_times_modes(const ep_kernel_task *t, int first, const acting *on,
+                                     const lane *tangent, lane *out) {
+  for (int at = 0; at < on->count; at++) {
+    const int e = on->all ? at : on->element[at];
     const double *h = (const double *)tangent + e;
     const lane *g = (const lane *)t->g + (size_t)(first + e) * (size_t)t->blocks * 9;
-    lane *row = out + (size_t)e * (size_t)t->blocks * 9;
+    lane *row = out + (size_t)at * (size_t)t->blocks * 9;
     for (int b = 0; b < t->blocks * PARTS; b++) {
       const part *x = (const part *)(g + 9 * (b / PARTS)) + b % PARTS;
       part *y = (part *)(row + 9 * (b / PARTS)) + b % PARTS;
@@ -155,18 +162,19 @@ static void tangent_times_modes(const ep_kernel_task *t, int first, const lane *
 }
 
 // A tile of K: rows row .. row + TILE_ROWS - 1 (of block row / 8), `columns` vectors from block
-// `column` on, over all elements of one group.
-LANE_INLINE void add_tile(const ep_kernel_task *t, const lane *g, const lane *b, int count, int row,
-                          int column, const int columns) {
+// `column` on, over the acting elements of one group.
+LANE_INLINE void add_tile(const ep_kernel_task *t, const lane *g, const lane *b, const acting *on,
+                          int row, int column, const int columns) {
   const size_t stride = (size_t)t->blocks * 9, width = (size_t)(t->blocks * PARTS);
   const int wide = columns * PARTS;
   part sum[TILE_ROWS][TILE_COLUMNS * PARTS];
   part *k = (part *)t->k + (size_t)row * width + (size_t)(column * PARTS);
   for (int i = 0; i < TILE_ROWS; i++)
     for (int j = 0; j < wide; j++) sum[i][j] = k[(size_t)i * width + (size_t)j];
-  for (int e = 0; e < count; e++) {
-    const double *left = (const double *)(g + (size_t)e * stride + 9 * (row / 8)) + row % 8;
-    const lane *right = b + (size_t)e * stride + 9 * (size_t)column;
+  for (int at = 0; at < on->count; at++) {
+    const size_t e = (size_t)(on->all ? at : on->element[at]);
+    const double *left = (const double *)(g + e * stride + 9 * (row / 8)) + row % 8;
+    const lane *right = b + (size_t)at * stride + 9 * (size_t)column;
     for (int c = 0; c < 9; c++) {
       part x[TILE_COLUMNS * PARTS];
       for (int j = 0; j < wide; j++) x[j] = part_of(right + 9 * (j / PARTS) + c, j % PARTS);
@@ -181,20 +189,44 @@ LANE_INLINE void add_tile(const ep_kernel_task *t, const lane *g, const lane *b,
 }
 
 // K += G^T B on the blocks of the upper triangle.
-static void add_stiffness(const ep_kernel_task *t, int first, const lane *b) {
-  const int count = t->s - first < EP_LANES ? t->s - first : EP_LANES;
+LANE_INLINE void add_stiffness(const ep_kernel_task *t, int first, const acting *on,
+                               const lane *b) {
   const lane *g = (const lane *)t->g + (size_t)first * (size_t)t->blocks * 9;
   for (int row = 0; row < 8 * t->blocks; row += TILE_ROWS) {
     int column = row / 8;
     for (; column + TILE_COLUMNS <= t->blocks; column += TILE_COLUMNS)
-      add_tile(t, g, b, count, row, column, TILE_COLUMNS);
-    if (TILE_COLUMNS > 1 && column < t->blocks) add_tile(t, g, b, count, row, column, 1);
+      add_tile(t, g, b, on, row, column, TILE_COLUMNS);
+    if (TILE_COLUMNS > 1 && column < t->blocks) add_tile(t, g, b, on, row, column, 1);
   }
+}
+
+LANE_INLINE void add_group(const ep_kernel_task *t, int first, const acting *on,
+                           const lane stress[9], lane *tangent) {
+  lane *product = (lane *)t->scratch + 81;
+  if (t->f) add_force(t, first, on, stress);
+  if (!t->k) return;
+  if (t->project) lane_project(tangent);
+  tangent_times_modes(t, first, on, tangent, product);
+  add_stiffness(t, first, on, product);
 }
 
 static void mirror(int n, double *k) {
   for (int i = 0; i < n; i++)
     for (int j = 0; j < i; j++) k[n * i + j] = k[n * j + i];
+}
+
+static void add_all(const ep_kernel_task *t, int first, const lane stress[9], lane *tangent) {
+  const acting all = {1, t->s - first < EP_LANES ? t->s - first : EP_LANES, {0}};
+  add_group(t, first, &all, stress, tangent);
+}
+
+// Of guards (one term) those below their limit: the others would add exact zeros.
+static void add_some(const ep_kernel_task *t, int first, lane energy, const lane stress[9],
+                     lane *tangent) {
+  acting some = {0, 0, {0}};
+  for (int e = 0; e < EP_LANES && first + e < t->s; e++)
+    if (energy[e] != 0) some.element[some.count++] = e;
+  add_group(t, first, &some, stress, tangent);
 }
 
 void EP_KERNEL(ep_kernel_task *t) {
@@ -213,21 +245,22 @@ void EP_KERNEL(ep_kernel_task *t) {
     if (t->material == EP_VOLUME_PENALTY && !lane_any(lane_crushed(f))) continue;
     for (int c = 0; c < 9; c++) stress[c] = lane_all(0);
     for (int c = 0; tangent && c < 81; c++) tangent[c] = lane_all(0);
+    lane energy = lane_all(0);
     for (int i = 0; i < t->terms; i++) {
-      lane energy = lane_all(0);
+      energy = lane_all(0);
       add_term(t, &t->term[i], first, f, &energy, stress, tangent);
       t->term[i].energy += lane_sum(energy);
     }
-    if (t->f && t->g_float) narrow_force(t, first, stress);
-    if (t->f && !t->g_float) add_force(t, first, stress);
-    if (!t->k) continue;
-    if (t->project) lane_project(tangent);
     if (t->g_float) {
+      if (t->f) narrow_force(t, first, stress);
+      if (!t->k) continue;
+      if (t->project) lane_project(tangent);
       narrow_stiffness(t, first, tangent, k);
-      continue;
+    } else if (t->material == EP_GUARD_WALL || t->material == EP_GUARD_SOFT) {
+      add_some(t, first, energy, stress, tangent);
+    } else {
+      add_all(t, first, stress, tangent);
     }
-    tangent_times_modes(t, first, tangent, product);
-    add_stiffness(t, first, product);
   }
   for (int i = 0; i < t->terms; i++) t->term[i].energy *= t->term[i].scale;
   if (t->k && t->g_float) narrow_finish(t, (const float *)k);

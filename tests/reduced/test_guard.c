@@ -359,6 +359,49 @@ static void reach_is_safe(void **state) {
   bar_free(b);
 }
 
+static double cofactor(const double f[9], double c[9]) {
+  for (int i = 0; i < 9; i++) {
+    const int i1 = (i / 3 + 1) % 3 * 3, i2 = (i / 3 + 2) % 3 * 3, j1 = (i + 1) % 3,
+              j2 = (i + 2) % 3;
+    c[i] = f[i1 + j1] * f[i2 + j2] - f[i1 + j2] * f[i2 + j1];
+  }
+  return f[0] * c[0] + f[1] * c[1] + f[2] * c[2];
+}
+
+// A guard whose modes are the entries of F: the worst D of the length of the reach, by
+// D = -reach cof(F + D) / |cof(F + D)|, stationary where det is least on that sphere.
+static void no_way_within_reach_is_worse(void **state) {
+  (void)state;
+  bar *b = make(0.5);
+  _Alignas(64) double q[16], packed[2 * 72], jacobians[8];
+  double modes[81] = {0}, random[R], least = 1;
+  for (int c = 0; c < 9; c++) modes[10 * c] = 1;
+  ep_pack_cubature(9, 1, modes, packed);
+  for (int i = 0; i < 2000; i++) {
+    double f[9], d[9], cof[9], det = 0;
+    const double limit = i % 2 ? 0.15 : 0.01 + 0.0003 * i;
+    memset(q, 0, sizeof q);
+    bar_random_q(b, 1, random);
+    for (int c = 0; c < 9; c++) q[c] = 0.0004 * i * random[c] / fabs(random[i % 9]);
+    const double reach = ep_guard_of(ep_isa_here()).reach(1, 2, packed, &limit, q, jacobians);
+    for (int c = 0; c < 9; c++) f[c] = (c % 4 == 0) + q[c], d[c] = i % 3 ? 0 : 0.3 * random[c];
+    if (reach == 0) continue;
+    for (int k = 0; k < 40; k++) {
+      double at[9], square = 0;
+      for (int c = 0; c < 9; c++) at[c] = f[c] + d[c];
+      cofactor(at, cof);
+      for (int c = 0; c < 9; c++) square += cof[c] * cof[c];
+      for (int c = 0; c < 9; c++) d[c] = -reach * cof[c] / sqrt(square);
+      for (int c = 0; c < 9; c++) at[c] = f[c] + d[c];
+      det = cofactor(at, cof);
+      assert_true(det >= limit - 1e-12);
+    }
+    least = fmin(least, det - limit);
+  }
+  assert_true(least < 0.01); // the bound is nearly met by some
+  bar_free(b);
+}
+
 static void gone_is_no_less_than_the_change(void **state) {
   (void)state;
   bar *b = make(0.5);
@@ -501,6 +544,7 @@ int main(void) {
       cmocka_unit_test(parts_meet_smoothly),
       cmocka_unit_test(projection_is_semidefinite),
       cmocka_unit_test(reach_is_safe),
+      cmocka_unit_test(no_way_within_reach_is_worse),
       cmocka_unit_test(gone_is_no_less_than_the_change),
       cmocka_unit_test(memory_changes_nothing),
       cmocka_unit_test(rest_is_untouched),
