@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "app/plan/planner.h"
+#include "app/scene/obstacle_start.h"
 
 // Raised whenever a stage computes something else from the same input: old results are then not
 // found any more.
@@ -87,6 +88,7 @@ bool ep_plan_uses_descriptors(const ep_planner *p) {
 ep_status ep_plan_make(const ep_scene *scene, const ep_shapes *shapes, ep_plan *out,
                        ep_error *err) {
   memset(out, 0, sizeof *out);
+  EP_TRY(ep_obstacles_check_start(scene, shapes, err));
   const size_t most = (size_t)shapes->count + 2 * (size_t)shapes->examples + 14;
   out->stage = calloc(most, sizeof *out->stage);
   if (!out->stage) return ep_fail(err, EP_ERR_MEMORY, "no memory for the plan");

@@ -111,6 +111,7 @@ typedef struct ep_scene_obstacle {
   double friction;
   ep_frame at; // where it stands at first
   ep_motion_path motion;
+  char place[136]; // in the file (":12:5: obstacles.0") or of --set: for messages
 } ep_scene_obstacle;
 
 // What `eigenpose compare` sweeps (docs/scene.md).

@@ -104,6 +104,7 @@ static ep_status read_obstacle(const ep_scene_reader *r, unsigned index, const r
   const ep_turn none = {.degrees = 0};
   ep_turn_matrix(&none, out->at.R);
   snprintf(key, sizeof key, "obstacles.%u", index);
+  ep_read_place(r, key, out->place, sizeof out->place);
   if ((raw->plane != NULL) + (raw->sphere != NULL) + (raw->box != NULL) != 1)
     return ep_read_refuse(r, key, "give one of plane, sphere, box");
   if (raw->plane) EP_TRY(read_plane(r, key, raw->plane, out));

@@ -21,9 +21,7 @@ static const char *set_of(const ep_scene_reader *r, const char *key, int *length
   return NULL;
 }
 
-// ":line:column: key" in the file, ": --set key" for what comes from the command line. The end of a
-// long name says more than its beginning.
-static void place_of(const ep_scene_reader *r, const char *key, char *out, size_t size) {
+void ep_read_place(const ep_scene_reader *r, const char *key, char *out, size_t size) {
   int line, column, own;
   const char *set = set_of(r, key, &own);
   if (set && (size_t)own == strlen(key))
@@ -49,7 +47,7 @@ ep_status ep_read_refuse(const ep_scene_reader *r, const char *key, const char *
   vsnprintf(text, sizeof text, format, args);
   va_end(args);
   char place[136];
-  place_of(r, key, place, sizeof place);
+  ep_read_place(r, key, place, sizeof place);
   const bool in_file = r->nsets && !strstr(place, "--set"); // another key's value may not fit it
   return ep_fail(r->err, EP_ERR_SCENE, "%s%s: %s%s", r->name, place, text,
                  in_file ? " (with --set)" : "");
@@ -111,7 +109,7 @@ static ep_status field_selection(const ep_scene_reader *r, const char *key,
 static void set_place(const ep_scene_reader *r, const char *key, ep_selection *out) {
   const size_t length = strlen(r->name), most = 90;
   char place[136];
-  place_of(r, key, place, sizeof place);
+  ep_read_place(r, key, place, sizeof place);
   snprintf(out->key, sizeof out->key, "%s%.90s%.135s", length > most ? "..." : "",
            r->name + (length > most ? length - most : 0), place);
 }

@@ -15,6 +15,9 @@ typedef struct ep_scene_reader {
   ep_error *err;
 } ep_scene_reader;
 
+// Where the value at a dotted key stands: ":line:column: key" in the file, ": --set key" for what
+// comes from the command line.
+void ep_read_place(const ep_scene_reader *r, const char *key, char *out, size_t size);
 // A complaint about the value at a dotted key: EP_ERR_SCENE.
 ep_status ep_read_refuse(const ep_scene_reader *r, const char *key, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
