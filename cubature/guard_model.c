@@ -82,6 +82,7 @@ static double edges(const ep_guard_model *m, int e, const double *x) {
 typedef struct look_work {
   ep_guard_model *model;
   const double *q;
+  bool moved; // positions, not displacements
 } look_work;
 
 static void place(void *context, int piece, int from, int to) {
@@ -89,7 +90,7 @@ static void place(void *context, int piece, int from, int to) {
   const look_work *w = context;
   const ep_guard_model *m = w->model;
   const size_t n3 = 3 * (size_t)m->fem->mesh->nv, first = 3 * (size_t)from, end = 3 * (size_t)to;
-  memcpy(m->x + first, m->fem->mesh->x + first, (end - first) * sizeof *m->x);
+  for (size_t i = first; i < end; i++) m->x[i] = w->moved ? m->fem->mesh->x[i] : 0;
   for (size_t a = 0; a < (size_t)m->basis->r; a++)
     for (size_t i = first; i < end; i++) m->x[i] += w->q[a] * m->basis->u[a * n3 + i];
 }
@@ -101,16 +102,18 @@ static void measure(void *context, int piece, int from, int to) {
     w->model->ratio[e] = edges(w->model, e, w->model->x) * w->model->rest[e];
 }
 
+static void over_cores(const ep_guard_model *m, int count, ep_range_work *work, look_work *w) {
+  if (m->nt < WORTH_THREADS)
+    work(w, 0, 0, count);
+  else
+    ep_parallel_ranges(count, work, w);
+}
+
 // J of all elements at q.
 static void look(ep_guard_model *m, const double *q) {
-  look_work work = {m, q};
-  if (m->nt < WORTH_THREADS) {
-    place(&work, 0, 0, m->fem->mesh->nv);
-    measure(&work, 0, 0, m->nt);
-    return;
-  }
-  ep_parallel_ranges(m->fem->mesh->nv, place, &work);
-  ep_parallel_ranges(m->nt, measure, &work);
+  look_work w = {m, q, true};
+  over_cores(m, m->fem->mesh->nv, place, &w);
+  over_cores(m, m->nt, measure, &w);
 }
 
 static void allow(ep_guard_model *m) {
@@ -276,13 +279,11 @@ int ep_guard_model_inverted(ep_guard_model *m) {
 }
 
 double ep_guard_model_reach(ep_guard_model *m, const double *q) {
-  const ep_mesh *mesh = m->fem->mesh;
+  look_work w = {m, q, false};
   double largest = 0;
-  look(m, q);
-  for (size_t i = 0; i < 3 * (size_t)mesh->nv; i += 3) {
-    double square = 0;
-    for (size_t c = i; c < i + 3; c++) square += pow(m->x[c] - mesh->x[c], 2);
-    largest = fmax(largest, square);
-  }
+  over_cores(m, m->fem->mesh->nv, place, &w);
+  for (size_t i = 0; i < 3 * (size_t)m->fem->mesh->nv; i += 3)
+    largest =
+        fmax(largest, m->x[i] * m->x[i] + m->x[i + 1] * m->x[i + 1] + m->x[i + 2] * m->x[i + 2]);
   return sqrt(largest);
 }

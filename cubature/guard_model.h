@@ -20,7 +20,7 @@ typedef struct ep_guard_model {
   double *allowed; // (nt) the limit it would have; 0: no guard (an example turns it over)
   double *ratio;   // (nt) J of all elements when last looked at
   double *rest;    // (nt) 1 / determinant of the edges at rest
-  double *x;       // (3 nv) positions when last looked at
+  double *x;       // (3 nv) scratch: positions or displacements
   double *before;  // (2 r) coordinates and velocities at the beginning of the last step
   double *rows;    // (9 x r) scratch
   void *block;     // of the state

@@ -3,7 +3,8 @@
 // is at most half of what the example leaves of it, and what an example turns over is no guard. On
 // a bar of few cubature elements, pushed with its weight in ways that were not drawn, no tet of the
 // whole mesh is inverted at any time; pushed with five times its weight at most a tenth as many as
-// without guards, and none once it was let go; without the guards many are.
+// without guards, and none once it was let go; without the guards many are. Stiffness and density
+// do not matter: the pushes are measured in what they do, the time in periods.
 #include "cubature/forces.h"
 #include "cubature/guards.h"
 #include "reduced/bake/model_build.h"
@@ -21,9 +22,9 @@ typedef struct fixture {
 } fixture;
 
 // A bar; with an example that presses its far end flat (share: of its height that is left there).
-static void make_fixture(fixture *f, int examples, double share) {
-  make_bar(&f->b, (int[3]){9, 3, 3}, (double[3]){4, 1, 1}, EP_STVK_VOLUME,
-           (ep_elastic){1000, 1e5, 0.4}, 1);
+static void make_fixture_of(fixture *f, ep_material model, ep_elastic elastic, int examples,
+                            double share) {
+  make_bar(&f->b, (int[3]){9, 3, 3}, (double[3]){4, 1, 1}, model, elastic, 1);
   double *pose = vector_of(f->b.n3);
   for (size_t v = 0; v < (size_t)f->b.mesh.nv; v++) {
     const double *x = f->b.mesh.x + 3 * v;
@@ -36,6 +37,10 @@ static void make_fixture(fixture *f, int examples, double share) {
   o.elements = ELEMENTS, o.poses = 40;
   ASSERT_OK(ep_cubature_train(&f->b.fem, &f->basis, &o, NULL, &f->cubature, err));
   free(pose);
+}
+
+static void make_fixture(fixture *f, int examples, double share) {
+  make_fixture_of(f, EP_STVK_VOLUME, (ep_elastic){1000, 1e5, 0.4}, examples, share);
 }
 
 static void free_fixture(fixture *f) {
@@ -106,6 +111,29 @@ static void test_examples_are_left_free(void **state) {
     ep_guards_free(&g);
     free_fixture(&f);
   }
+}
+
+// 1,024 times as stiff or dense is the same push in other units of force and time; powers of 4, so
+// that in binary numbers it is so to the last bit.
+static void test_units_do_not_matter(void **state) {
+  (void)state;
+  static const ep_elastic elastic[3] = {
+      {1000, 1e5, 0.4}, {1000, 1024 * 1e5, 0.4}, {1024 * 1000, 1e5, 0.4}};
+  ep_guards first = {0};
+  for (int i = 0; i < 3; i++) {
+    fixture f;
+    make_fixture_of(&f, EP_STVK_VOLUME, elastic[i], 0, 1);
+    ep_guards g = choose(&f, 200, 1);
+    if (i > 0) {
+      assert_int_equal(g.count, first.count);
+      assert_memory_equal(g.tet, first.tet, (size_t)g.count * sizeof *g.tet);
+      ep_guards_free(&g);
+    } else {
+      first = g;
+    }
+    free_fixture(&f);
+  }
+  ep_guards_free(&first);
 }
 
 // ---- pushes ------------------------------------------------------------------------------------
@@ -184,6 +212,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_repeatable_and_bounded),
       cmocka_unit_test(test_examples_are_left_free),
+      cmocka_unit_test(test_units_do_not_matter),
       cmocka_unit_test(test_hard_pushes_invert_nothing),
   };
   return cmocka_run_group_tests(tests, session_start, session_stop);
