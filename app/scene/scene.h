@@ -147,6 +147,14 @@ typedef struct ep_start {
   double velocity[3], spin[3]; // [m/s], [rad/s], world axes
 } ep_start;
 
+// A change of all material constants, wherever they come from and of every part (`eigenpose
+// stress`); 0: as they are.
+typedef struct ep_elastic_change {
+  double density, young; // factors
+  bool sets_poisson;
+  double poisson; // instead
+} ep_elastic_change;
+
 typedef struct ep_scene {
   char *path, *name;
   uint64_t seed;
@@ -154,6 +162,7 @@ typedef struct ep_scene {
   ep_material model;
   bool has_material; // else the mesh file's own constants
   ep_elastic material;
+  ep_elastic_change change;
   int nfixed;
   ep_selection *fixed;
   int nregions; // named ones, then those given in families; equal ones are one

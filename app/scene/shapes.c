@@ -72,20 +72,25 @@ static ep_status read_family(const ep_scene *scene, int index, ep_log *log, ep_s
   return EP_OK;
 }
 
+static ep_elastic changed(ep_elastic m, const ep_elastic_change *change) {
+  if (change->density > 0) m.density *= change->density;
+  if (change->young > 0) m.young *= change->young;
+  if (change->sets_poisson) m.poisson = change->poisson;
+  return m;
+}
+
 static ep_status choose_material(const ep_scene *scene, ep_shapes *out, ep_error *err) {
   const ep_mesh *mesh = &out->shape[0].mesh;
-  if (scene->has_material) {
-    out->nmaterials = 1;
-    out->material = &scene->material;
-  } else if (mesh->nmaterials) {
-    out->nmaterials = mesh->nmaterials;
-    out->material = mesh->material;
-  } else {
+  const ep_elastic *given = scene->has_material ? &scene->material : mesh->material;
+  out->nmaterials = scene->has_material ? 1 : mesh->nmaterials;
+  if (out->nmaterials == 0)
     return ep_fail(err, EP_ERR_SCENE,
                    "%s: no material: %s carries none, so object.material must give density, "
                    "young and poisson",
                    scene->path, mesh->name);
-  }
+  out->material = malloc((size_t)out->nmaterials * sizeof *out->material);
+  if (!out->material) return ep_fail(err, EP_ERR_MEMORY, "no memory for material constants");
+  for (int i = 0; i < out->nmaterials; i++) out->material[i] = changed(given[i], &scene->change);
   ep_hash_text text = {0};
   ep_hash_add(&text, "model=%d n=%d", (int)scene->model, out->nmaterials);
   for (int i = 0; i < out->nmaterials; i++)
@@ -188,6 +193,7 @@ void ep_shapes_free(ep_shapes *shapes) {
   for (int i = 0; shapes->region && i < shapes->regions; i++) free(shapes->region[i]);
   free(shapes->region);
   free(shapes->set);
+  free(shapes->material);
   memset(shapes, 0, sizeof *shapes);
 }
 

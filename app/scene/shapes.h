@@ -39,8 +39,8 @@ typedef struct ep_shapes {
   // Sets of examples of the LB path: those that act everywhere first, then each region with a
   // family, in order of the scene. 0 where no family has a region: one set, acting everywhere.
   int sets, *set; // (sets) number of the scene's region, -1: everywhere
-  int nmaterials; // constants to use (scene before mesh file)
-  const ep_elastic *material;
+  int nmaterials; // constants to use (scene before mesh file, with the scene's change)
+  ep_elastic *material;
   ep_digest physics; // hash of material model, constants and their place
 } ep_shapes;
 

@@ -99,9 +99,8 @@ void ep_stress_result_free(ep_stress_result *result);
 // All cases of a scene, malloc'd; quick: only the ends of every axis, no variants.
 ep_status ep_stress_list(const ep_session *base, bool quick, int *count, ep_stress_case **out,
                          ep_error *err);
-// The scene of a case: `scene`, a copy with loads of its own, is changed in place. material: the
-// base scene's constants.
-void ep_stress_apply(const ep_stress_case *c, const ep_elastic *material, ep_scene *scene);
+// The scene of a case: `scene`, a copy with loads of its own, is changed in place.
+void ep_stress_apply(const ep_stress_case *c, ep_scene *scene);
 
 // A case under way: scene, meshes, model, stepper.
 typedef struct ep_stress_bench {

@@ -32,7 +32,7 @@ ep_status ep_stress_open(const ep_session *base, const ep_stress_case *c, ep_str
   if (!out->load) return ep_fail(err, EP_ERR_MEMORY, "no memory for loads");
   if (loads) memcpy(out->load, base->scene.load, loads * sizeof *out->load);
   out->scene.load = out->load;
-  ep_stress_apply(c, &base->shapes.material[0], &out->scene);
+  ep_stress_apply(c, &out->scene);
   EP_TRY(ep_shapes_read(&out->scene, NULL, &out->shapes, err));
   EP_TRY(ep_plan_make(&out->scene, &out->shapes, &out->plan, err));
   EP_TRY(bake(base, out, err));

@@ -92,12 +92,12 @@ static bool variant_applies(const ep_session *base, ep_stress_variant v) {
   case EP_VARIANT_NEOHOOKEAN:
   case EP_VARIANT_COROTATIONAL: {
     const ep_material m = (ep_material)(v - EP_VARIANT_STVK + EP_STVK);
-    return m != scene->model && (scene->evaluator == EP_EVALUATE_CUBATURE || is_stvk(m));
+    return m != scene->model && (ep_is_cubature(scene->evaluator) || is_stvk(m));
   }
   case EP_VARIANT_CUBATURE:
-    return scene->evaluator != EP_EVALUATE_CUBATURE;
+    return !ep_is_cubature(scene->evaluator);
   case EP_VARIANT_CUBIC:
-    return scene->evaluator == EP_EVALUATE_CUBATURE && is_stvk(scene->model);
+    return ep_is_cubature(scene->evaluator) && is_stvk(scene->model);
   case EP_VARIANT_LB:
     return examples && scene->methods != EP_METHOD_LB;
   case EP_VARIANT_GREEN:
@@ -167,6 +167,8 @@ ep_status ep_stress_list(const ep_session *base, bool quick, int *count, ep_stre
 // ---- the scene of a case -----------------------------------------------------------------------
 
 static void apply_variant(ep_stress_variant v, ep_scene *scene) {
+  const bool in_floats =
+      scene->evaluator == EP_EVALUATE_CUBATURE_FLOAT || scene->evaluator == EP_EVALUATE_CUBIC_FLOAT;
   switch (v) {
   case EP_VARIANT_STVK:
   case EP_VARIANT_STVK_VOLUME:
@@ -175,10 +177,10 @@ static void apply_variant(ep_stress_variant v, ep_scene *scene) {
     scene->model = (ep_material)(v - EP_VARIANT_STVK + EP_STVK);
     break;
   case EP_VARIANT_CUBATURE:
-    scene->evaluator = EP_EVALUATE_CUBATURE;
+    scene->evaluator = in_floats ? EP_EVALUATE_CUBATURE_FLOAT : EP_EVALUATE_CUBATURE;
     break;
   case EP_VARIANT_CUBIC:
-    scene->evaluator = EP_EVALUATE_CUBIC;
+    scene->evaluator = in_floats ? EP_EVALUATE_CUBIC_FLOAT : EP_EVALUATE_CUBIC;
     if (ep_scene_local(scene)) scene->relief = 0; // polynomials know no part of the object
     break;
   case EP_VARIANT_LB:
@@ -194,24 +196,24 @@ static void apply_variant(ep_stress_variant v, ep_scene *scene) {
   }
 }
 
-void ep_stress_apply(const ep_stress_case *c, const ep_elastic *material, ep_scene *scene) {
-  scene->has_material = true;
-  scene->material = *material;
+void ep_stress_apply(const ep_stress_case *c, ep_scene *scene) {
+  ep_elastic_change *change = &scene->change;
   apply_variant(c->variant, scene);
   switch (c->axis) {
   case EP_STRESS_STIFFNESS:
-    scene->material.young *= c->value;
+    change->young = c->value;
     if (c->second > 0) scene->dt = c->second;
     break;
   case EP_STRESS_POISSON:
-    scene->material.poisson = c->value;
+    change->sets_poisson = true;
+    change->poisson = c->value;
     break;
   case EP_STRESS_STIFF:
-    scene->material.young *= c->value;
-    scene->material.poisson = nearly_incompressible;
+    *change = (ep_elastic_change){
+        .young = c->value, .sets_poisson = true, .poisson = nearly_incompressible};
     break;
   case EP_STRESS_DENSITY:
-    scene->material.density *= c->value;
+    change->density = c->value;
     break;
   case EP_STRESS_DT:
     scene->dt = c->value;

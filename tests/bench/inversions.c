@@ -90,7 +90,8 @@ int main(int argc, char **argv) {
   ep_session session;
   if (argc > 1) cli.input = argv[1];
   const int starts = argc > 2 && starts_only(argv[2]);
-  for (int i = 2 + starts; i + 1 < argc && strcmp(argv[i], "--set") == 0; i += 2)
+  for (int i = 2 + starts; i + 1 < argc && cli.nsets < EP_SETS_MAX && strcmp(argv[i], "--set") == 0;
+       i += 2)
     cli.set[cli.nsets++] = argv[i + 1];
   if (!cli.input || argc != 2 + starts + 2 * cli.nsets) {
     fprintf(stderr, "usage: inversions SCENE [--starts] [--set key=value ...]\n");
