@@ -101,6 +101,15 @@ const double *ep_state_weights(const ep_state *state); // (k) example weights of
 // (regions x r) target configurations of the last step, regions = ep_model_regions.
 const double *ep_state_target(const ep_state *state);
 
+// All that a state carries from a step into the next - configuration, motion, place, the target of
+// the interpolation, what integrators, guards and unfolding remember - as a list of numbers: to put
+// a state aside, or another of the same model in its place, which then goes on with the same bits.
+// q and velocity alone (above) begin a new motion. set: EP_ERR_ARGUMENT where it is no list of a
+// state of this model and version; the state is unchanged.
+size_t ep_state_history_size(const ep_state *state);
+void ep_state_get_history(const ep_state *state, double *out); // (size)
+ep_status ep_state_set_history(ep_state *state, size_t count, const double *history);
+
 // ---- free motion (reduced/frame.h) -----------------------------------------------------------
 // A model is free where nothing holds it (size.rigid): its states then move as a whole too. For a
 // held model the frame stays the identity about the origin: world and model space are the same.

@@ -59,7 +59,8 @@ ep_status ep_command_stress(const ep_cli *cli, ep_error *err) {
   EP_TRY(ep_session_open(cli, &session, err));
   ep_status status = ep_petsc_start(err);
   if (status == EP_OK) {
-    status = cli->replay ? ep_stress_replay(&session, cli->replay, err) : sweep(cli, &session, err);
+    status = cli->replay ? ep_stress_replay(&session, cli->replay, cli->json, err)
+                         : sweep(cli, &session, err);
     ep_petsc_stop();
   }
   ep_session_close(&session);

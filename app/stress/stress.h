@@ -83,16 +83,14 @@ typedef struct ep_stress_result {
   int newton_most;
   long line_search, projections;
   int halvings, unfolded, inverted_start, inverted_most, inverted_end;
-  double growth;  // largest (E' - E) / max E of a step of implicit Euler without loads and example
-                  // force; NAN where it is not measured
-  double step_us; // median
-  int r;
-  double *q, *v;  // (r) before the step that failed, to be replayed; or NULL
-  double t;       // [s] of it
-  bool loaded;    // the scene's loads acted
-  bool coasting;  // without example force
-  ep_frame frame; // of a free object
-  double velocity[3], spin[3];
+  double growth;   // largest (E' - E) / max E of a step of implicit Euler without loads and example
+                   // force; NAN where it is not measured
+  double step_us;  // median
+  double *history; // (numbers) of the state before the step that failed (ep_state_get_history), or
+  size_t numbers;  // NULL
+  double t;        // [s] of it
+  bool loaded;     // the scene's loads acted
+  bool coasting;   // without example force
 } ep_stress_result;
 void ep_stress_result_free(ep_stress_result *result);
 
@@ -125,8 +123,12 @@ int ep_stress_inverted(ep_stress_bench *bench);
 // (memory, disk).
 ep_status ep_stress_run(const ep_session *base, const ep_stress_case *c, ep_stress_result *out,
                         ep_error *err);
-// Do the step of a stored state (failures/*.json) again and tell about it on stdout.
-ep_status ep_stress_replay(const ep_session *base, const char *path, ep_error *err);
+// Do the step of a stored state (failures/*.json) again and tell about it on stdout, as JSON or as
+// text. Errors: EP_ERR_FORMAT (no such file, of an older version, of another model), EP_ERR_NUMERIC
+// (the step fails again).
+ep_status ep_stress_replay(const ep_session *base, const char *path, bool json, ep_error *err);
+
+enum { EP_STRESS_FORMAT = 2 }; // "format" of these files
 
 // ---- what comes of it --------------------------------------------------------------------------
 typedef struct ep_stress_report {

@@ -82,14 +82,11 @@ json_t *ep_stress_json(const ep_stress_report *report) {
 
 // A failure as `stress --replay` takes it.
 static json_t *failure_json(const ep_stress_result *r) {
-  return json_pack("{s:s, s:s, s:f, s:f, s:i, s:f, s:b, s:b, s:o, s:o, s:o, s:o, s:o, s:o}",
-                   "variant", ep_stress_variant_name(r->what.variant), "axis",
-                   ep_stress_axis_name(r->what.axis), "value", r->what.value, "second",
-                   r->what.second, "step", r->failed_step, "t", r->t, "loaded", r->loaded,
-                   "coasting", r->coasting, "q", ep_json_numbers(r->r, r->q), "v",
-                   ep_json_numbers(r->r, r->v), "position", ep_json_numbers(3, r->frame.c),
-                   "rotation", ep_json_numbers(9, r->frame.R), "velocity",
-                   ep_json_numbers(3, r->velocity), "spin", ep_json_numbers(3, r->spin));
+  return json_pack(
+      "{s:i, s:s, s:s, s:f, s:f, s:i, s:f, s:b, s:b, s:o}", "format", (int)EP_STRESS_FORMAT,
+      "variant", ep_stress_variant_name(r->what.variant), "axis", ep_stress_axis_name(r->what.axis),
+      "value", r->what.value, "second", r->what.second, "step", r->failed_step, "t", r->t, "loaded",
+      r->loaded, "coasting", r->coasting, "history", ep_json_numbers((int)r->numbers, r->history));
 }
 
 // An earlier report in the same folder may have left failures of its own.
@@ -114,7 +111,7 @@ static ep_status remove_failures(const char *folder, ep_error *err) {
 static ep_status write_failures(const char *folder, const ep_stress_report *report, ep_error *err) {
   char path[EP_PATH_MAX], name[96];
   for (int i = 0; i < report->count; i++) {
-    if (!report->result[i].q) continue;
+    if (!report->result[i].history) continue;
     EP_TRY(ep_path_join(folder, "failures", path, err));
     EP_TRY(ep_make_folders(path, err));
     snprintf(name, sizeof name, "failures/case-%04d.json", i + 1);

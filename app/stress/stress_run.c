@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "app/report.h"
 #include "app/run/simulate.h"
 #include "app/stress/stress.h"
 
@@ -19,28 +20,20 @@ typedef struct run {
 } run;
 
 void ep_stress_result_free(ep_stress_result *result) {
-  free(result->q);
-  free(result->v);
-  result->q = result->v = NULL;
+  free(result->history);
+  result->history = NULL;
 }
 
 // The state as it is before a step.
 static ep_status remember(run *w, double t, bool loaded, ep_error *err) {
   ep_stress_result *out = w->result;
   ep_state *state = ep_stepper_state(w->bench.stepper);
-  const size_t r = (size_t)w->bench.model.model.size.r;
-  if (!out->q) out->q = malloc(r * sizeof *out->q);
-  if (!out->v) out->v = malloc(r * sizeof *out->v);
-  if (!out->q || !out->v) return ep_fail(err, EP_ERR_MEMORY, "no memory for a state");
-  memcpy(out->q, ep_state_q(state), r * sizeof *out->q);
-  memcpy(out->v, ep_state_velocity(state), r * sizeof *out->v);
-  out->r = (int)r;
+  out->numbers = ep_state_history_size(state);
+  if (!out->history) out->history = malloc(out->numbers * sizeof *out->history);
+  if (!out->history) return ep_fail(err, EP_ERR_MEMORY, "no memory for a state");
+  ep_state_get_history(state, out->history);
   out->t = t;
   out->loaded = loaded;
-  if (w->bench.model.model.size.rigid) {
-    out->frame = *ep_state_frame(state);
-    ep_state_motion(state, out->velocity, out->spin);
-  }
   return EP_OK;
 }
 
@@ -58,20 +51,18 @@ static void worse(ep_stress_result *result, ep_stress_outcome outcome, const cha
 }
 
 // A step that fails must leave the state as it was: tried once more on the state at hand.
-static void check_refusal(run *w) {
+static ep_status check_refusal(run *w, ep_error *err) {
   ep_state *state = ep_stepper_state(w->bench.stepper);
-  const size_t bytes = (size_t)w->bench.model.model.size.r * sizeof(double);
-  double *before = malloc(2 * bytes + 1);
-  if (!before) return;
-  memcpy(before, ep_state_q(state), bytes);
-  memcpy((char *)before + bytes, ep_state_velocity(state), bytes);
-  const ep_frame frame = *ep_state_frame(state);
-  if (ep_step(state, ep_stepper_def(w->bench.stepper), NULL) != EP_OK &&
-      (memcmp(before, ep_state_q(state), bytes) != 0 ||
-       memcmp((char *)before + bytes, ep_state_velocity(state), bytes) != 0 ||
-       memcmp(&frame, ep_state_frame(state), sizeof frame) != 0))
+  const size_t count = ep_state_history_size(state), bytes = count * sizeof(double);
+  double *before = malloc(2 * bytes);
+  if (!before) return ep_fail(err, EP_ERR_MEMORY, "no memory for a state");
+  ep_state_get_history(state, before);
+  const ep_status status = ep_step(state, ep_stepper_def(w->bench.stepper), NULL);
+  ep_state_get_history(state, before + count);
+  if (status != EP_OK && memcmp(before, before + count, bytes) != 0)
     worse(w->result, EP_STRESS_BROKEN, "a failed step changed the state");
   free(before);
+  return EP_OK;
 }
 
 // Is the energy of the step before this one to be compared with? Neither loads nor example force
@@ -117,8 +108,7 @@ static ep_status one_step(run *w, int step, bool *go_on, ep_error *err) {
     snprintf(why, sizeof why, "step %d failed even at 1/%d of the time step", step,
              1 << EP_HALVINGS_MAX);
     worse(out, EP_STRESS_REFUSED, why);
-    check_refusal(w);
-    return EP_OK;
+    return check_refusal(w, err);
   }
   take(w, step, &done);
   out->steps = step + 1;
@@ -179,16 +169,6 @@ ep_status ep_stress_run(const ep_session *base, const ep_stress_case *c, ep_stre
 
 // ---- replay ------------------------------------------------------------------------------------
 
-static bool take_numbers(const json_t *list, int count, double *out) {
-  if (!json_is_array(list) || json_array_size(list) != (size_t)count) return false;
-  for (int i = 0; i < count; i++) {
-    const json_t *value = json_array_get(list, (size_t)i);
-    if (!json_is_number(value)) return false;
-    out[i] = json_number_value(value);
-  }
-  return true;
-}
-
 static bool take_case(const json_t *root, ep_stress_case *c) {
   const char *variant, *axis;
   if (json_unpack((json_t *)root, "{s:s, s:s, s:F, s:F}", "variant", &variant, "axis", &axis,
@@ -202,51 +182,105 @@ static bool take_case(const json_t *root, ep_stress_case *c) {
   return v < EP_VARIANTS && a < EP_STRESS_AXES;
 }
 
-static bool take_state(const json_t *root, const ep_model *model, ep_state *state) {
-  ep_frame frame;
-  double velocity[3], spin[3];
-  if (!take_numbers(json_object_get(root, "q"), model->size.r, ep_state_q(state)) ||
-      !take_numbers(json_object_get(root, "v"), model->size.r, ep_state_velocity(state)))
-    return false;
-  if (!model->size.rigid) return true;
-  return take_numbers(json_object_get(root, "position"), 3, frame.c) &&
-         take_numbers(json_object_get(root, "rotation"), 9, frame.R) &&
-         take_numbers(json_object_get(root, "velocity"), 3, velocity) &&
-         take_numbers(json_object_get(root, "spin"), 3, spin) &&
-         ep_state_set_frame(state, &frame) == EP_OK &&
-         ep_state_set_motion(state, velocity, spin) == EP_OK;
+static json_t *told(const ep_stress_bench *b, const ep_advance *done, int before, int after) {
+  return json_pack(
+      "{s:s, s:i, s:i, s:i, s:i, s:i, s:o, s:i, s:i}", "scene", b->scene.name, "newton_iterations",
+      done->newton_iterations, "line_search_steps", done->line_search_steps, "projections",
+      done->projections, "halvings", done->halvings, "unfolded_steps", done->unfolding, "residual",
+      ep_json_number(done->last.residual), "inverted_start", before, "inverted_end", after);
 }
 
-static ep_status replay(ep_stress_bench *b, const json_t *root, const char *path, ep_error *err) {
-  ep_state *state = ep_stepper_state(b->stepper);
-  if (!take_state(root, &b->model.model, state))
-    return ep_fail(err, EP_ERR_FORMAT, "%s: no state of this scene's model (%d modes)", path,
-                   b->model.model.size.r);
-  const int before = ep_stress_inverted(b);
+static ep_status step_again(ep_stress_bench *b, const json_t *root, const char *path, bool json,
+                            ep_error *err) {
   if (json_is_true(json_object_get(root, "coasting"))) ep_stepper_def(b->stepper)->strength = 0;
+  const int before = ep_stress_inverted(b);
+  const double t = json_number_value(json_object_get(root, "t"));
+  const bool loaded = json_is_true(json_object_get(root, "loaded"));
   ep_advance done;
-  const ep_status status =
-      ep_stepper_advance(b->stepper, json_number_value(json_object_get(root, "t")), b->scene.dt,
-                         json_is_true(json_object_get(root, "loaded")), &done);
-  printf("step %s: %d Newton iterations, %d line-search steps, %d projections, %d halvings, last "
-         "residual %.3g, inverted tets %d -> %d\n",
-         status == EP_OK ? "done" : "failed", done.newton_iterations, done.line_search_steps,
-         done.projections, done.halvings, done.last.residual, before, ep_stress_inverted(b));
+  const ep_status status = ep_stepper_advance(b->stepper, t, b->scene.dt, loaded, &done);
+  const int after = ep_stress_inverted(b);
+  if (status != EP_OK)
+    return ep_fail(err, status,
+                   "%s: the step fails again, even at 1/%d of the time step: %d Newton iterations, "
+                   "%d line-search steps, %d projections in all",
+                   path, 1 << EP_HALVINGS_MAX, done.newton_iterations, done.line_search_steps,
+                   done.projections);
+  if (json) return ep_report_print(told(b, &done, before, after), err);
+  printf("step done: %d Newton iterations, %d line-search steps, %d projections, %d halvings, last "
+         "residual %.3g, inverted tets %d -> %d%s\n",
+         done.newton_iterations, done.line_search_steps, done.projections, done.halvings,
+         done.last.residual, before, after, done.unfolding ? ", unfolding" : "");
   return EP_OK;
 }
 
-ep_status ep_stress_replay(const ep_session *base, const char *path, ep_error *err) {
+// The state of the file; where the very first step failed it may be left out, and is the case's
+// start.
+static ep_status put_state(ep_stress_bench *b, const ep_stress_case *c, const json_t *root,
+                           const char *path, ep_error *err) {
+  const json_t *list = json_object_get(root, "history");
+  ep_state *state = ep_stepper_state(b->stepper);
+  const size_t needed = ep_state_history_size(state), count = json_array_size(list);
+  if (!list && json_integer_value(json_object_get(root, "step")) == 0)
+    return ep_stress_begin(b, c, err);
+  if (!json_is_array(list) || count != needed)
+    return ep_fail(err, EP_ERR_FORMAT,
+                   "%s: \"history\" holds %zu numbers, a state of this scene's model has %zu: the "
+                   "scene was changed since",
+                   path, count, needed);
+  double *history = malloc(needed * sizeof *history);
+  if (!history) return ep_fail(err, EP_ERR_MEMORY, "no memory for a state");
+  for (size_t i = 0; i < needed; i++) {
+    const json_t *value = json_array_get(list, i);
+    history[i] = json_is_number(value) ? json_number_value(value) : NAN;
+  }
+  const ep_status status = ep_state_set_history(state, needed, history);
+  free(history);
+  return status == EP_OK
+             ? EP_OK
+             : ep_fail(err, EP_ERR_FORMAT,
+                       "%s: \"history\" is not the state of a model of this version", path);
+}
+
+// Of this version, and whole?
+static ep_status check_file(const json_t *root, const char *path, ep_error *err) {
+  const json_t *format = json_object_get(root, "format");
+  if (!json_is_number(json_object_get(root, "value")) ||
+      !json_is_string(json_object_get(root, "axis")))
+    return ep_fail(err, EP_ERR_FORMAT, "%s: no failure of a stress test", path);
+  if (json_integer_value(format) != EP_STRESS_FORMAT)
+    return ep_fail(
+        err, EP_ERR_FORMAT,
+        "%s: of another version (\"format\" is not %d); run `eigenpose stress` once more", path,
+        (int)EP_STRESS_FORMAT);
+  static const char *const flags[] = {"loaded", "coasting"};
+  for (int i = 0; i < 2; i++)
+    if (!json_is_boolean(json_object_get(root, flags[i])))
+      return ep_fail(err, EP_ERR_FORMAT, "%s: lacks \"%s\"", path, flags[i]);
+  if (!json_is_number(json_object_get(root, "t")) ||
+      !json_is_integer(json_object_get(root, "step")))
+    return ep_fail(err, EP_ERR_FORMAT, "%s: lacks \"t\" or \"step\"", path);
+  return EP_OK;
+}
+
+static ep_status replay(const ep_session *base, const json_t *root, const char *path, bool json,
+                        ep_error *err) {
   ep_stress_case c = {0};
+  EP_TRY(check_file(root, path, err));
+  if (!take_case(root, &c))
+    return ep_fail(err, EP_ERR_FORMAT, "%s: no case of this version's stress test", path);
+  ep_stress_bench bench = {0};
+  ep_status status = ep_stress_open(base, &c, &bench, err);
+  if (status == EP_OK) status = put_state(&bench, &c, root, path, err);
+  if (status == EP_OK) status = step_again(&bench, root, path, json, err);
+  ep_stress_close(&bench);
+  return status;
+}
+
+ep_status ep_stress_replay(const ep_session *base, const char *path, bool json, ep_error *err) {
   json_error_t trouble;
   json_t *root = json_load_file(path, 0, &trouble);
   if (!root) return ep_fail(err, EP_ERR_FORMAT, "%s:%d: %s", path, trouble.line, trouble.text);
-  ep_stress_bench bench = {0};
-  ep_status status = EP_OK;
-  if (!take_case(root, &c))
-    status = ep_fail(err, EP_ERR_FORMAT, "%s: no failure of a stress test", path);
-  if (status == EP_OK) status = ep_stress_open(base, &c, &bench, err);
-  if (status == EP_OK) status = replay(&bench, root, path, err);
-  ep_stress_close(&bench);
+  const ep_status status = replay(base, root, path, json, err);
   json_decref(root);
   return status;
 }

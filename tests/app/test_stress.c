@@ -2,8 +2,8 @@
 // something for; nothing breaks, and what starts inverted or collapsed ends without inverted tets;
 // without loads the energy does not grow (implicit Euler: W + T falls by at least |v' - v|^2 / 2 in
 // every step where W is convex along it); the record, the table and the page tell of the same
-// cases; a stored state is done again; a file that is no failure is refused; no variant asks the
-// run time for what a scene file may not.
+// cases; a stored state is done again; a file that is no failure, cut or of another version is
+// refused; no variant asks the run time for what a scene file may not.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -92,23 +92,38 @@ static void all_tell_of_the_same_cases(void **state) {
   free(record);
 }
 
-#define NONE "[0,0,0,0,0,0,0,0,0,0,0,0]" // a number for each mode of the beam
+static void refused(const char *text, const char *why) {
+  write_text("failure.json", text);
+  assert_int_equal(program("", "stress beam.yaml --replay failure.json --cache cache"), 3);
+  char *said = text_of("err.txt");
+  if (!strstr(said, why)) fail_msg("%s: %s", why, said);
+  free(said);
+}
+
+// The first line of a failure's file; the first step of a case needs no more.
+#define CASE(variant)                                                                              \
+  "{\"format\": 2, \"variant\": \"" variant                                                        \
+  "\", \"axis\": \"load\", \"value\": 10, \"second\": 0, \"t\": 0, \"loaded\": true, "             \
+  "\"coasting\": false, \"step\": "
 
 static void a_state_is_done_again(void **state) {
   (void)state;
-  write_text("failure.json",
-             "{\"variant\": \"scene\", \"axis\": \"load\", \"value\": 10, \"second\": 0, \"t\": 0,"
-             "\"loaded\": true, \"q\": " NONE ", \"v\": " NONE "}");
+  write_text("failure.json", CASE("scene") "0}");
   assert_int_equal(program("", "stress beam.yaml --replay failure.json --cache cache"), 0);
   char *said = text_of("out.txt");
   if (!strstr(said, "step done: ")) fail_msg("%s", said);
   free(said);
-  write_text("failure.json", "{\"variant\": \"scene\"}");
-  assert_int_equal(program("", "stress beam.yaml --replay failure.json --cache cache"), 3);
-  write_text("failure.json",
-             "{\"variant\": \"scene\", \"axis\": \"load\", \"value\": 10, \"second\": 0, \"t\": 0,"
-             "\"loaded\": true, \"q\": [0,0], \"v\": " NONE "}");
-  assert_int_equal(program("", "stress beam.yaml --replay failure.json --cache cache"), 3);
+  assert_int_equal(program("", "stress beam.yaml --replay failure.json --json --cache cache"), 0);
+  json_t *root = report(); // one object
+  assert_true(number(root, "newton_iterations") > 0 && number(root, "inverted_end") == 0);
+  json_decref(root);
+  refused("{\"variant\": \"scene\"}", "no failure of a stress test");
+  refused("{\"variant\": \"scene\", \"axis\": \"load\", \"value\": 10, \"second\": 0, \"t\": 0,"
+          "\"loaded\": true, \"q\": [0,0,0,0,0,0,0,0], \"v\": [0,0,0,0,0,0,0,0]}",
+          "of another version");
+  refused(CASE("scene") "3, \"history\": [0, 0]}", "holds 2 numbers");
+  refused(CASE("scene") "3}", "holds 0 numbers");
+  refused(CASE("scene"), "failure.json:1: ");
 }
 
 // What a scene file would refuse - relief in a region, by exact polynomials - no variant asks for.
@@ -118,10 +133,7 @@ static void variants_suit_local_examples(void **state) {
   static const char *const variants[] = {"scene", "stvk", "neohookean", "cubic", "green"};
   for (size_t i = 0; i < sizeof variants / sizeof *variants; i++) {
     char text[256];
-    snprintf(text, sizeof text,
-             "{\"variant\": \"%s\", \"axis\": \"load\", \"value\": 1, \"second\": 0, \"t\": 0,"
-             "\"loaded\": true, \"q\": [0,0,0,0,0,0,0,0], \"v\": [0,0,0,0,0,0,0,0]}",
-             variants[i]);
+    snprintf(text, sizeof text, CASE("%s") "0}", variants[i]);
     write_text("local.json", text);
     const int code = program("", "stress local.yaml --replay local.json --cache cache");
     if (code != 0) fail_msg("%s: exit code %d: %s", variants[i], code, text_of("err.txt"));
