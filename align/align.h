@@ -81,7 +81,8 @@ typedef struct ep_map_quality {
   double determinant;                     // of A, +-1
   double coverage;                        // share of the example's volume hit by the map
   double cycle; // round trip rms / radius of gyration before the two maps were made inverse to each
-                // other, when they knew nothing of each other; -1 where not made
+                // other, when they knew nothing of each other; of two refined (below) the shorter;
+                // -1 where not made
   // Elastic refinement of the map together with its reverse: energy (volumes 1, without the
   // landmarks' term) and rms distortion, 0 where parts move rigidly. Where the round trip was long
   // and no landmarks were given, plain nearest neighbours were refined too and the lower energy
