@@ -89,7 +89,8 @@ size_t ep_state_bytes(const ep_model *model);
 // EP_ERR_NUMERIC (K0 is not positive definite).
 ep_status ep_state_init(const ep_model *model, void *memory, size_t bytes, ep_state **out);
 const ep_model *ep_state_model(const ep_state *state);
-const double *ep_state_k0_factor(const ep_state *state); // L (r x r, lower), K0 = L L^T
+const double *ep_state_k0_factor(const ep_state *state);  // L (r x r, lower), K0 = L L^T
+void ep_state_solve_k0(const ep_state *state, double *x); // x (r) := K0^-1 x
 const char *ep_state_isa(const ep_state *state); // kernels in use: "baseline", "avx2", "avx512"
 // Use these kernels instead of the widest the processor runs; all give the same bits. Errors:
 // EP_ERR_UNSUPPORTED (not on this processor), EP_ERR_ARGUMENT (no such name): nothing is changed.

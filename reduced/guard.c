@@ -117,7 +117,7 @@ double ep_guard_add(ep_state *state, const double *q, double *f, double *h, int 
   for (int group = 0; group < groups; group++) {
     if (state->guard_reach[group] > 0) continue;
     const double part = evaluate(state, group, f != NULL, h != NULL, project);
-    if (part == 0) continue; // NaN goes on
+    if (part == 0) continue; // where q is no number too: the material's energy says so
     energy += part;
     for (int a = 0; f && a < r; a++) f[a] += state->padded_f[a];
     for (int a = 0; h && a < r; a++)
@@ -129,4 +129,16 @@ double ep_guard_add(ep_state *state, const double *q, double *f, double *h, int 
 void ep_guard_begin(ep_state *state) {
   const int touched = survey(state, state->q, &state->guards_over);
   state->guards_soft = state->guards_over > 0 || (state->guards_soft && touched);
+}
+
+double ep_guard_stiffness(double lambda, double mu) {
+  return EP_GUARD_STIFFNESS * fmax(lambda, mu);
+}
+
+void ep_guard_add_growth(int r, const double *g, double *growth) {
+  for (int a = 0; a < r; a++) {
+    double square = 0;
+    for (int c = 0; c < 9; c++) square += g[c * r + a] * g[c * r + a];
+    growth[a] = fmax(growth[a], sqrt(square));
+  }
 }

@@ -28,12 +28,18 @@
 // Share of the limit below which the wall goes on as a parabola.
 #define EP_GUARD_FLOOR 0.02
 
-// k = this times max(lambda, mu). The material's own penalty, 5 max(lambda, mu) (J - 0.5)^2, has
-// the force of the wall where J is a third of the limit.
+// k = this times max(lambda, mu), as in the material's own penalty, 10 max(lambda, mu) (J - 0.5)^2
+// / 2. With a limit of 0.15 the wall has less force than it above x = 0.87, 41 times as much at
+// x = 1 / 3: it begins softly and is not passed.
 #define EP_GUARD_STIFFNESS 10.0
 
 // s: a fifth of the material's own penalty. As strong as it, parabolas of many guards jam too.
 #define EP_GUARD_SOFTNESS 0.2
+
+// Of one guard: its k, of its element's Lame constants [Pa]; and what its dF/dq, g (9 x r), makes
+// of the growth (r, in and out) of its group: no less than any |G_a|_F of it.
+double ep_guard_stiffness(double lambda, double mu);
+void ep_guard_add_growth(int r, const double *g, double *growth);
 
 struct ep_state;
 

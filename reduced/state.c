@@ -129,6 +129,10 @@ const ep_model *ep_state_model(const ep_state *state) {
 const double *ep_state_k0_factor(const ep_state *state) {
   return state->k0_factor;
 }
+void ep_state_solve_k0(const ep_state *state, double *x) {
+  ep_solve_lower(state->model->size.r, state->k0_factor, x);
+  ep_solve_lower_transposed(state->model->size.r, state->k0_factor, x);
+}
 const char *ep_state_isa(const ep_state *state) {
   return state->isa;
 }

@@ -251,12 +251,6 @@ static ep_status build_cubature(builder *b, ep_error *err) {
   return status;
 }
 
-// Stiffness of the wall over the penalty of the material: both resist a flat element alike where
-// the wall begins.
-static double wall_stiffness(const ep_fem *fem, int e) {
-  return EP_GUARD_STIFFNESS * fmax(fem->lambda[e], fem->mu[e]);
-}
-
 static ep_status build_guards(builder *b, ep_error *err) {
   const ep_model_parts *p = b->parts;
   const size_t r = (size_t)b->size.r, width = 8 * (size_t)b->size.blocks;
@@ -264,17 +258,14 @@ static ep_status build_guards(builder *b, ep_error *err) {
   double *g = malloc((size_t)p->guards * 9 * r * sizeof *g);
   if (!g) return ep_fail(err, EP_ERR_MEMORY, "no memory for %d guards", p->guards);
   for (size_t i = 0; i < (size_t)p->guards; i++) {
-    double *gi = g + i * 9 * r, *growth = b->a.guard_growth + i / 8 * width;
-    element_gradient(b, p->guard_tet[i], gi);
-    b->a.guard_tet[i] = p->guard_tet[i];
+    const int tet = p->guard_tet[i];
+    double *gi = g + i * 9 * r;
+    element_gradient(b, tet, gi);
+    b->a.guard_tet[i] = tet;
     b->a.guard_w[i] = p->guard_w[i];
     b->a.guard_limit[i] = p->guard_limit[i];
-    b->a.guard_stiffness[i] = wall_stiffness(p->fem, p->guard_tet[i]);
-    for (size_t a = 0; a < r; a++) {
-      double square = 0;
-      for (size_t c = 0; c < 9; c++) square += gi[c * r + a] * gi[c * r + a];
-      growth[a] = fmax(growth[a], sqrt(square));
-    }
+    b->a.guard_stiffness[i] = ep_guard_stiffness(p->fem->lambda[tet], p->fem->mu[tet]);
+    ep_guard_add_growth(b->size.r, gi, b->a.guard_growth + i / 8 * width);
   }
   ep_pack_cubature(b->size.r, p->guards, g, b->a.guard_g);
   free(g);
