@@ -7,6 +7,7 @@
 #include "cubature/forces.h"
 #include "cubature/parallel.h"
 #include "reduced/guard.h"
+#include "reduced/unfold.h"
 
 // A guard resists below this share of its volume; below this part of the share that an example or
 // the pose itself leaves it, so that no guard stands between the object and an example.
@@ -132,20 +133,12 @@ static void allow(ep_guard_model *m) {
 // A part of the longest period: the smallest eigenvalue of K0 by inverse iteration.
 static void choose_step(ep_guard_model *m) {
   const size_t r = (size_t)m->model.size.r;
-  const double *l = ep_state_k0_factor(m->state);
   double *x = ep_state_q(m->state), growth = 1;
   for (size_t a = 0; a < r; a++) x[a] = 1;
   for (int i = 0; i < POWER_ITERATIONS; i++) {
     double square = 0;
-    for (size_t a = 0; a < r; a++) {
-      for (size_t b = 0; b < a; b++) x[a] -= l[a * r + b] * x[b];
-      x[a] /= l[a * r + a];
-    }
-    for (size_t a = r; a-- > 0;) {
-      for (size_t b = a + 1; b < r; b++) x[a] -= l[b * r + a] * x[b];
-      x[a] /= l[a * r + a];
-      square += x[a] * x[a];
-    }
+    ep_state_solve_k0(m->state, x);
+    for (size_t a = 0; a < r; a++) square += x[a] * x[a];
     growth = sqrt(square);
     for (size_t a = 0; a < r; a++) x[a] /= growth;
   }
@@ -217,15 +210,11 @@ bool ep_guard_model_add(ep_guard_model *m, int tet) {
   ep_element_rows(m->fem, m->basis, tet, m->rows);
   m->tet[at] = m->number[at] = tet;
   m->w[at] = m->around[tet];
-  m->stiffness[at] = EP_GUARD_STIFFNESS * fmax(m->fem->lambda[tet], m->fem->mu[tet]);
+  m->stiffness[at] = ep_guard_stiffness(m->fem->lambda[tet], m->fem->mu[tet]);
   m->limit[at] = m->allowed[tet];
   ep_pack_cubature((int)r, 1, m->rows, m->g + (size_t)at * 9 * width);
   if (at % 8 == 0) memset(growth, 0, width * sizeof *growth);
-  for (size_t a = 0; a < r; a++) {
-    double square = 0;
-    for (size_t c = 0; c < 9; c++) square += m->rows[c * r + a] * m->rows[c * r + a];
-    growth[a] = fmax(growth[a], sqrt(square));
-  }
+  ep_guard_add_growth((int)r, m->rows, growth);
   m->model.size.guards++;
   return true;
 }
@@ -233,11 +222,12 @@ bool ep_guard_model_add(ep_guard_model *m, int tet) {
 // ---- motion ------------------------------------------------------------------------------------
 
 ep_status ep_guard_model_begin(ep_guard_model *m, ep_error *err) {
-  if (ep_state_init(&m->model, m->block, ep_state_bytes(&m->model), &m->state) == EP_OK)
-    return EP_OK;
-  return ep_fail(err, EP_ERR_NUMERIC,
-                 "guards: the stiffness of the basis is not positive definite; is enough of the "
-                 "object fixed?");
+  if (ep_state_init(&m->model, m->block, ep_state_bytes(&m->model), &m->state) != EP_OK)
+    return ep_fail(err, EP_ERR_NUMERIC,
+                   "guards: the stiffness of the basis is not positive definite; is enough of the "
+                   "object fixed?");
+  ep_unfold_never(m->state); // what guards leave turned over is to be seen
+  return EP_OK;
 }
 
 static bool step(ep_guard_model *m, ep_step_def *def, double dt, int level) {

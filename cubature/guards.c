@@ -72,20 +72,6 @@ static void add_patch(chooser *c, double *u) {
     }
 }
 
-// x := K0^-1 x.
-static void solve_k0(const ep_guard_model *m, double *x) {
-  const size_t r = (size_t)m->model.size.r;
-  const double *l = ep_state_k0_factor(m->state);
-  for (size_t a = 0; a < r; a++) {
-    for (size_t b = 0; b < a; b++) x[a] -= l[a * r + b] * x[b];
-    x[a] /= l[a * r + a];
-  }
-  for (size_t a = r; a-- > 0;) {
-    for (size_t b = a + 1; b < r; b++) x[a] -= l[b * r + a] * x[b];
-    x[a] /= l[a * r + a];
-  }
-}
-
 // One or two patches, scaled by what they would do to a linear object.
 static void draw_push(chooser *c, double hard) {
   ep_guard_model *m = &c->model;
@@ -98,7 +84,7 @@ static void draw_push(chooser *c, double hard) {
     for (size_t i = 0; i < n3; i++) c->force[a] += m->basis->u[a * n3 + i] * c->u[i];
   }
   memcpy(c->start, c->force, r * sizeof *c->start);
-  solve_k0(m, c->start);
+  ep_state_solve_k0(m->state, c->start);
   const double reach = ep_guard_model_reach(m, c->start);
   const double wanted = hard * pow(10, ep_random_uniform(&c->rng) - 0.5);
   const double scale = reach > 0 ? wanted * ep_mesh_extent(m->fem->mesh) / reach : 0;
