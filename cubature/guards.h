@@ -2,9 +2,9 @@
 // constraint generation. The reduced model is pushed harder and harder and let go, all elements of
 // the mesh are looked at after every step, and the worst of every cluster that turned over becomes
 // a guard; then the step is done again with it, until nothing turns over in it or this push has had
-// its share of the guards and of the effort. Time: some 4 pushes x effort evaluations of the reduced
-// energy at most (a step under way is finished), and fewer looks at the mesh than that; memory: some
-// vectors of the mesh.
+// its share of the guards and of the effort. Time: some 4 pushes x effort evaluations of the
+// reduced energy at most (a step under way is finished), and fewer looks at the mesh than that;
+// memory: some vectors of the mesh.
 #ifndef EP_CUBATURE_GUARDS_H
 #define EP_CUBATURE_GUARDS_H
 
