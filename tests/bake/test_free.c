@@ -440,8 +440,46 @@ static void a_failed_step_changes_nothing(void **state) {
   drop_free_body(&f);
 }
 
+// A state that takes the history of a flying one flies on with the same bits.
+static void a_history_goes_on_the_same(void **state) {
+  (void)state;
+  static const ep_integrator integrator[] = {EP_IMPLICIT_EULER, EP_NEWMARK, EP_BDF2};
+  free_body f;
+  make_free_body(&f, CELLS, SIZE, EP_STVK, SOFT, 8, 16, 2);
+  const size_t bytes = (ep_state_bytes(f.model) + 63) / 64 * 64;
+  for (int i = 0; i < 3; i++) {
+    void *block = aligned_alloc(64, bytes);
+    ep_state *copy;
+    assert_non_null(block);
+    assert_int_equal(ep_state_init(f.model, block, bytes, &copy), EP_OK);
+    const size_t count = ep_state_history_size(copy);
+    double *one = vector_of(count), *two = vector_of(count);
+    const double velocity[3] = {1, 2, 3}, spin[3] = {3, 1, 2};
+    ep_step_def def = ep_default_step();
+    def.integrator = integrator[i];
+    random_state(&f, 0.2, 1);
+    assert_int_equal(ep_state_set_motion(f.state, velocity, spin), EP_OK);
+    for (int n = 0; n < 5; n++) assert_int_equal(ep_step(f.state, &def, NULL), EP_OK);
+    ep_state_get_history(f.state, one);
+    assert_int_equal(ep_state_set_history(copy, count, one), EP_OK);
+    for (int n = 0; n < 10; n++) {
+      assert_int_equal(ep_step(f.state, &def, NULL), EP_OK);
+      assert_int_equal(ep_step(copy, &def, NULL), EP_OK);
+    }
+    ep_state_get_history(f.state, one);
+    ep_state_get_history(copy, two);
+    assert_memory_equal(one, two, count * sizeof *one);
+    assert_memory_equal(ep_state_frame(f.state), ep_state_frame(copy), sizeof(ep_frame));
+    free(one);
+    free(two);
+    free(block);
+  }
+  drop_free_body(&f);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
+      cmocka_unit_test(a_history_goes_on_the_same),
       cmocka_unit_test(the_basis_is_free_of_rigid_modes),
       cmocka_unit_test(a_free_bar_rings_as_one),
       cmocka_unit_test(the_inertia_is_that_of_the_vertices),
