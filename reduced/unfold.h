@@ -16,13 +16,12 @@
 //   v^2 / 2 < y;
 //   or where it is jammed: at the beginnings of EP_UNFOLD_CALM steps in a row it hardly moved,
 //   v^2 / 2 < W / 5, and no load kept it there, |dW/dq| < |K0 q| / 5.
-// It ends with all guards above their limits, nearly at rest (y a hundredth of V at the
-// beginning; anywhere where V = y) where W <= V: neither
-// change adds energy. Where a load keeps the object from rest it ends once the object is calm under
-// it, V being softer than the material: that change adds W - V, and is the only one that may. It
-// also ends where the caller writes q: then nothing is known of the new shape (whoever writes the
-// velocity alone pushes an object that goes on unfolding). What a step reports as elastic energy is
-// V meanwhile.
+// It ends with all guards above their limits, nearly at rest (y at most a hundredth of V at the
+// beginning; anywhere where V = y), where W <= V: neither change adds energy. Where a load keeps the
+// object from rest it ends once the object is calm under it, V being softer than the material: that
+// change adds W - V, and is the only one that may. It also ends where the caller writes q: then
+// nothing is known of the new shape (whoever writes the velocity alone pushes an object that goes on
+// unfolding). What a step reports as elastic energy is V meanwhile.
 #ifndef EP_REDUCED_UNFOLD_H
 #define EP_REDUCED_UNFOLD_H
 
