@@ -39,7 +39,7 @@ void ep_notice(ep_log *log, const char *format, ...) {
 }
 
 void ep_warn(ep_log *log, const char *format, ...) {
-  if (!log) return;
+  if (!log || log->mute) return;
   log->warnings++;
   va_list args;
   va_start(args, format);

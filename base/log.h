@@ -7,6 +7,7 @@
 
 typedef struct ep_log {
   bool quiet;    // no notices, no progress; warnings and errors still appear
+  bool mute;     // no warnings either
   bool terminal; // stderr is a terminal: progress is redrawn in place
   int warnings;  // how many were given, for the summary
   // progress of the stage under way (private)

@@ -40,7 +40,9 @@ static ep_status sweep(const ep_cli *cli, ep_session *session, ep_error *err) {
   const double started = ep_seconds();
   ep_progress_begin(&session->log, "stress", report.count);
   for (int i = 0; i < report.count && status == EP_OK; i++) {
-    status = ep_stress_run(session, &cases[i], &result[i], err);
+    ep_session quiet = *session; // the first case is the scene as it is: its warnings do for all
+    quiet.log.mute = i > 0;
+    status = ep_stress_run(&quiet, &cases[i], &result[i], err);
     ep_progress(&session->log, i + 1);
   }
   ep_progress_end(&session->log);
