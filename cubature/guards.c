@@ -105,6 +105,7 @@ static void draw_start(chooser *c) {
 
 typedef struct outcome {
   int during, left; // inverted tets: the most at any time, at the end
+  bool failed;      // a step did not converge, or left what is no number: it ended there
 } outcome;
 
 static int find(int *root, int v) {
@@ -147,10 +148,12 @@ static ep_status advance(chooser *c, bool stop, const double *force, outcome *ou
                          ep_error *err) {
   ep_guard_model *m = &c->model;
   for (;;) {
-    *go_on = ep_guard_model_step(m, force);
-    if (!*go_on) return EP_OK;
+    out->failed = !ep_guard_model_step(m, force);
+    *go_on = !out->failed;
+    if (out->failed) return EP_OK;
     out->left = ep_guard_model_inverted(m);
-    *go_on = out->left >= 0 && !(stop && spent(c));
+    out->failed = out->left < 0;
+    *go_on = !out->failed && !(stop && spent(c));
     if (!*go_on) return EP_OK;
     if (!stop || out->left == 0 || add_worst(c) == 0) break;
     EP_TRY(ep_guard_model_back(m, err));
@@ -220,6 +223,7 @@ static ep_status hold_out(chooser *c, ep_guards *out, ep_error *err) {
       ep_progress(c->log, ++c->done);
       out->tried++;
       out->left += now.left > 0;
+      out->failed += now.failed;
       out->most = out->most > now.during ? out->most : now.during;
     }
   return EP_OK;

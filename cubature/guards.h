@@ -28,6 +28,7 @@ typedef struct ep_guards {
   int cut;               // pushes that had their share of guards or effort and left more to do
   int tried, left, most; // held-out pushes, those that left tets inverted once let go, the most
                          // inverted at any time of them
+  int failed;            // held-out pushes that ended in a step without convergence: not tested
 } ep_guards;
 
 // cubature: what the elastic energy is summed over. Deterministic. Errors: EP_ERR_MEMORY,

@@ -9,20 +9,25 @@ static void tell(const ep_bake *bake) {
     ep_notice(bake->log, "guards: an example turns over %d tets; nothing keeps these from it",
               g->spared);
   if (g->full)
-    ep_warn(bake->log,
-            "guards: all %d are used and tets still turned over when pushed hard; raise "
-            "reduction.guards",
-            g->count);
-  if (g->cut > 0)
     ep_notice(bake->log,
-              "guards: %d pushes would have taken more than their share of the guards or of the "
-              "effort and were ended there",
+              "guards: all %d are used, and pushes far beyond the object's stiffness still turned "
+              "tets over; raise reduction.guards where loads are as hard",
+              g->count);
+  if (g->cut)
+    ep_notice(bake->log,
+              "guards: %d of the pushes would have taken more than their share of the guards or of "
+              "the effort and ended there",
               g->cut);
   if (g->left > 0)
     ep_warn(bake->log,
             "guards: %d of %d pushes kept for a test left tets inverted once they ended; raise "
             "reduction.guards or reduction.elements",
             g->left, g->tried);
+  if (g->failed > 0)
+    ep_notice(bake->log,
+              "guards: %d of %d pushes kept for a test are too hard for its steps; what they would "
+              "turn over is not known",
+              g->failed, g->tried);
 }
 
 static ep_status compute(ep_bake *bake, ep_bake_step *step, ep_error *err) {
