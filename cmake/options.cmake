@@ -40,6 +40,9 @@ function(ep_test name)
   if(NOT T_TIMEOUT)
     set(T_TIMEOUT 300)
   endif()
+  if(EP_SANITIZE OR EP_SANITIZE_THREAD) # three to five times as slow, and the machine may be busy
+    math(EXPR T_TIMEOUT "4 * ${T_TIMEOUT}")
+  endif()
   set_tests_properties(${name} PROPERTIES TIMEOUT ${T_TIMEOUT}
     ENVIRONMENT "ASAN_OPTIONS=detect_leaks=0;OPENBLAS_NUM_THREADS=1;OMP_NUM_THREADS=1")
 endfunction()

@@ -58,6 +58,7 @@ static random_scene draw_dragged(uint64_t seed) {
   s.dt = 1.0 / 60;
   s.steps = 40;
   s.damping_stiffness = 0.05;
+  s.angle = 0; // the path begins where the vertices are: such a spring allows no other way
   ep_random rng = ep_random_seed(seed, 9);
   s.load[0] = (random_load){.kind = LOAD_DRAG, .size = 1e3 * s.young, .until = 0.2};
   direction(&rng, s.load[0].vector);
