@@ -22,7 +22,7 @@ void ep_candidates_add(ep_candidates *c, const double r[9], const char *name) {
   memset(f, 0, sizeof *f);
   snprintf(f->name, sizeof f->name, "%s", name);
   memcpy(f->rotation, r, sizeof f->rotation);
-  f->reflected = ep_frame_determinant(r) < 0;
+  f->reflected = ep_determinant3(r) < 0;
   f->landmark = -1;
   const double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   f->start_angle = f->reflected ? 180 : ep_frame_between(r, identity);
@@ -97,7 +97,7 @@ static ep_status frame_from_marks(const ep_side *from, const ep_side *to, double
   EP_TRY(ep_svd(3, 3, s, u, sigma, vt, err));
   *spread = sigma[1] > SPREAD * SPREAD * sigma[0] && sigma[0] > 0;
   // R = U diag(1, 1, d) V^T
-  const double d = ep_frame_determinant(u) * ep_frame_determinant(vt) < 0 ? -1 : 1;
+  const double d = ep_determinant3(u) * ep_determinant3(vt) < 0 ? -1 : 1;
   for (int i = 0; i < 3; i++) u[3 * i + 2] *= d;
   ep_frame_multiply(u, vt, r);
   return EP_OK;

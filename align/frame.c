@@ -22,11 +22,6 @@ double ep_frame_angle(const double r[9]) {
   return atan2(sine, r[0] + r[4] + r[8] - 1) * 180 / acos(-1);
 }
 
-double ep_frame_determinant(const double a[9]) {
-  return a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) +
-         a[2] * (a[3] * a[7] - a[4] * a[6]);
-}
-
 void ep_frame_multiply(const double a[9], const double b[9], double out[9]) {
   double c[9];
   for (int i = 0; i < 3; i++)
@@ -159,7 +154,7 @@ ep_status ep_frame_axes(const ep_side *side, double v[9], double variance[3], ep
   double s[9];
   second_moment(side->n, side->x, side->share, s);
   EP_TRY(ep_eigen_symmetric(3, s, variance, v, err));
-  if (ep_frame_determinant(v) < 0)
+  if (ep_determinant3(v) < 0)
     for (int c = 0; c < 3; c++) v[6 + c] = -v[6 + c];
   return EP_OK;
 }

@@ -92,7 +92,6 @@ int ep_components(const ep_mesh *mesh);
 // ---- frame.c
 void ep_frame_identity(double r[9]);
 double ep_frame_angle(const double r[9]); // degrees
-double ep_frame_determinant(const double r[9]);
 void ep_frame_multiply(const double a[9], const double b[9], double out[9]); // may alias
 void ep_frame_transpose(const double a[9], double out[9]);
 // y (n x 3) = R x, row by row.

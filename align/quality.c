@@ -148,7 +148,7 @@ static double signed_volume(const double *x, const int *v) {
   double d[9];
   for (int k = 0; k < 9; k++)
     d[k] = x[3 * (size_t)v[1 + k / 3] + k % 3] - x[3 * (size_t)v[0] + k % 3];
-  return ep_frame_determinant(d);
+  return ep_determinant3(d);
 }
 
 ep_status ep_map_handedness(const ep_side *from, const ep_side *to, const double r[9],
@@ -159,7 +159,7 @@ ep_status ep_map_handedness(const ep_side *from, const ep_side *to, const double
   ep_status status =
       image && star ? EP_OK : ep_fail(err, EP_ERR_MEMORY, "no memory to judge a map");
   if (status == EP_OK) {
-    const double side = ep_frame_determinant(r) < 0 ? -1 : 1;
+    const double side = ep_determinant3(r) < 0 ? -1 : 1;
     ep_point_map_pull(map, from->n, to->shape->mesh, 3, to->x, image);
     for (int e = 0; e < mesh->nt; e++) {
       const int *v = mesh->tet + 4 * (size_t)e;

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "align/private.h"
+#include "linalg/dense.h"
 
 // Reframing stops when the frame turns by less.
 static const double REFRAME_DEGREES = 5;
@@ -24,13 +25,13 @@ double ep_frame_between(const double a[9], const double b[9]) {
   double back[9], turn[9];
   ep_frame_transpose(b, back);
   ep_frame_multiply(a, back, turn);
-  if (ep_frame_determinant(turn) < 0) return 180;
+  if (ep_determinant3(turn) < 0) return 180;
   return ep_frame_angle(turn);
 }
 
 ep_status ep_trial_run(const ep_side *from, const ep_side *to, const ep_match_rule *rule,
                        int rounds, ep_trial *t, ep_error *err) {
-  const bool mirrored = ep_frame_determinant(t->r) < 0;
+  const bool mirrored = ep_determinant3(t->r) < 0;
   EP_TRY(ep_match_levels(from, to, t->r, rule, t->p, NULL, NULL, err));
   for (t->rounds = 0; t->rounds < rounds; t->rounds++) {
     double turned[9];

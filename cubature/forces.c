@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "cubature/parallel.h"
+#include "linalg/dense.h"
 #include "reduced/reference.h"
 
 typedef struct create_work {
@@ -49,11 +50,6 @@ void ep_elements_free(ep_elements *elements) {
   *elements = (ep_elements){0};
 }
 
-static double determinant(const double f[9]) {
-  return f[0] * (f[4] * f[8] - f[5] * f[7]) - f[1] * (f[3] * f[8] - f[5] * f[6]) +
-         f[2] * (f[3] * f[7] - f[4] * f[6]);
-}
-
 // c = a b; c = a b^T.
 static void multiply(const double a[9], const double b[9], double c[9]) {
   for (int i = 0; i < 3; i++)
@@ -82,7 +78,7 @@ double ep_element_gradient(const ep_elements *elements, int e, const double *q, 
     for (; a < r; a++) sum[0] += row[a] * q[a];
     f[entry] = (entry % 4 == 0 ? 1.0 : 0.0) + ((sum[0] + sum[1]) + (sum[2] + sum[3]));
   }
-  return determinant(f);
+  return ep_determinant3(f);
 }
 
 void ep_element_pull_back(const ep_elements *elements, int e, const double stress[9], double *out) {

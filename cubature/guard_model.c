@@ -69,17 +69,6 @@ static ep_status weigh(ep_guard_model *m, ep_error *err) {
   return EP_OK;
 }
 
-// Six times the volume of element e at positions x (nv x 3), negative where it is turned over.
-static double edges(const ep_guard_model *m, int e, const double *x) {
-  const int *tet = m->fem->mesh->tet + 4 * (size_t)e;
-  const double *o = x + 3 * (size_t)tet[0];
-  double d[9];
-  for (int i = 0; i < 3; i++)
-    for (int c = 0; c < 3; c++) d[3 * i + c] = x[3 * (size_t)tet[i + 1] + (size_t)c] - o[c];
-  return d[0] * (d[4] * d[8] - d[5] * d[7]) - d[1] * (d[3] * d[8] - d[5] * d[6]) +
-         d[2] * (d[3] * d[7] - d[4] * d[6]);
-}
-
 typedef struct look_work {
   ep_guard_model *model;
   const double *q;
@@ -100,7 +89,7 @@ static void measure(void *context, int piece, int from, int to) {
   (void)piece;
   const look_work *w = context;
   for (int e = from; e < to; e++)
-    w->model->ratio[e] = edges(w->model, e, w->model->x) * w->model->rest[e];
+    w->model->ratio[e] = ep_tet_volume(w->model->fem->mesh, e, w->model->x) * w->model->rest[e];
 }
 
 static void over_cores(const ep_guard_model *m, int count, ep_range_work *work, look_work *w) {
@@ -120,7 +109,7 @@ static void look(ep_guard_model *m, const double *q) {
 static void allow(ep_guard_model *m) {
   const size_t r = (size_t)m->basis->r;
   for (int e = 0; e < m->nt; e++) {
-    m->rest[e] = 1 / edges(m, e, m->fem->mesh->x);
+    m->rest[e] = 1 / ep_tet_volume(m->fem->mesh, e, m->fem->mesh->x);
     m->allowed[e] = wall_begins;
   }
   for (size_t i = 0; i < (size_t)m->basis->examples; i++) {

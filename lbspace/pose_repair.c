@@ -297,11 +297,6 @@ static ep_status descend(repair *r, ep_error *err) {
 
 // ---- unfolding ---------------------------------------------------------------------------------
 
-static double determinant(const double a[9]) {
-  return a[0] * (a[4] * a[8] - a[5] * a[7]) + a[1] * (a[5] * a[6] - a[3] * a[8]) +
-         a[2] * (a[3] * a[7] - a[4] * a[6]);
-}
-
 // F of tet e with its singular values no less than UNFOLDED, right way round. That goes by the
 // factors themselves: where two singular values vanish J is round-off, of either sign, and so is
 // the handedness of the factors.
@@ -315,7 +310,7 @@ static ep_status unfolded(const repair *r, int e, double *out, ep_error *err) {
       f[k] += (r->u0[at] + r->delta[at]) * shape[3 * i + k % 3];
     }
   EP_TRY(ep_svd(3, 3, f, left, s, right, err));
-  if (determinant(left) * determinant(right) < 0) // the shortest axis points the wrong way
+  if (ep_determinant3(left) * ep_determinant3(right) < 0) // the shortest axis points the wrong way
     for (int k = 0; k < 3; k++) left[3 * k + 2] = -left[3 * k + 2];
   for (int i = 0; i < 9; i++) {
     out[i] = 0;

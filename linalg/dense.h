@@ -8,8 +8,15 @@
 void ep_gemm(int m, int n, int k, const double *a, const double *b, double *c);
 void ep_gemm_tn(int m, int n, int k, const double *a, const double *b, double *c);
 void ep_gemm_nt(int m, int n, int k, const double *a, const double *b, double *c);
-// Lower triangle of C (n x n) = A^T A, A (k x n); added to C where `add`. The upper one is untouched.
+// Lower triangle of C (n x n) = A^T A, A (k x n); added to C where `add`. The upper one is
+// untouched.
 void ep_syrk_tn(int n, int k, const double *a, int add, double *c);
+
+// Determinant of a (3 x 3).
+static inline double ep_determinant3(const double a[9]) {
+  return a[0] * (a[4] * a[8] - a[5] * a[7]) - a[1] * (a[3] * a[8] - a[5] * a[6]) +
+         a[2] * (a[3] * a[7] - a[4] * a[6]);
+}
 
 // Thin SVD A = U diag(s) V^T: A (m x n, destroyed), U (m x p), s (p), Vt (p x n), p = min(m, n).
 ep_status ep_svd(int m, int n, double *a, double *u, double *s, double *vt, ep_error *err);

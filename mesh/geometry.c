@@ -19,20 +19,20 @@ static double dot(const double *a, const double *b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static double volume_of(const int *v, const double *x) {
+double ep_tet_volume(const ep_mesh *mesh, int e, const double *x) {
   double d[9], n[3];
-  edges(v, x, d);
+  edges(mesh->tet + 4 * (size_t)e, x, d);
   cross(d + 3, d + 6, n);
   return dot(d, n) / 6;
 }
 
 void ep_tet_volumes(const ep_mesh *mesh, const double *x, double *volume) {
-  for (int e = 0; e < mesh->nt; e++) volume[e] = volume_of(mesh->tet + 4 * e, x);
+  for (int e = 0; e < mesh->nt; e++) volume[e] = ep_tet_volume(mesh, e, x);
 }
 
 double ep_mesh_volume(const ep_mesh *mesh) {
   double sum = 0;
-  for (int e = 0; e < mesh->nt; e++) sum += volume_of(mesh->tet + 4 * e, mesh->x);
+  for (int e = 0; e < mesh->nt; e++) sum += ep_tet_volume(mesh, e, mesh->x);
   return sum;
 }
 
@@ -40,8 +40,7 @@ int ep_mesh_inverted(const ep_mesh *mesh, const double *x, double *worst) {
   int count = 0;
   double lowest = INFINITY;
   for (int e = 0; e < mesh->nt; e++) {
-    const int *v = mesh->tet + 4 * e;
-    const double volume = volume_of(v, x), rest = volume_of(v, mesh->x);
+    const double volume = ep_tet_volume(mesh, e, x), rest = ep_tet_volume(mesh, e, mesh->x);
     if (!(volume > 0)) count++;
     if (rest > 0 && !(volume / rest >= lowest)) lowest = volume / rest;
   }
@@ -68,7 +67,7 @@ void ep_mesh_centroid(const ep_mesh *mesh, const double *x, double centroid[3]) 
   double sum[3] = {0, 0, 0}, total = 0;
   for (int e = 0; e < mesh->nt; e++) {
     const int *v = mesh->tet + 4 * e;
-    const double volume = volume_of(v, x);
+    const double volume = ep_tet_volume(mesh, e, x);
     total += volume;
     for (int i = 0; i < 4; i++)
       for (int k = 0; k < 3; k++) sum[k] += volume / 4 * x[3 * v[i] + k];
@@ -91,7 +90,7 @@ void ep_mesh_vertex_volumes(const ep_mesh *mesh, double *v) {
   memset(v, 0, (size_t)mesh->nv * sizeof *v);
   for (int e = 0; e < mesh->nt; e++) {
     const int *tet = mesh->tet + 4 * e;
-    const double quarter = volume_of(tet, mesh->x) / 4;
+    const double quarter = ep_tet_volume(mesh, e, mesh->x) / 4;
     for (int i = 0; i < 4; i++) v[tet[i]] += quarter;
   }
 }

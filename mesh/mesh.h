@@ -72,7 +72,8 @@ ep_status ep_mesh_require_sound(const ep_mesh *mesh, const ep_mesh_findings *fin
                                 ep_error *err);
 
 double ep_mesh_volume(const ep_mesh *mesh);
-// Volume of each tet (signed) at positions x (nv x 3), into volume (nt).
+// Signed volume of tet e at positions x (nv x 3); of each tet, into volume (nt).
+double ep_tet_volume(const ep_mesh *mesh, int e, const double *x);
 void ep_tet_volumes(const ep_mesh *mesh, const double *x, double *volume);
 // Number of tets with non-positive volume at positions x; *worst (may be NULL) the lowest ratio of
 // deformed to rest volume.

@@ -15,6 +15,7 @@
 
 #include "align/private.h"
 #include "base/random.h"
+#include "linalg/dense.h"
 #include "shapes.h"
 #include "tests/petsc_session.h"
 
@@ -470,7 +471,7 @@ static void reflections_are_found_on_request(void **state) {
   ep_map_options o = ep_default_map_options();
   match(&from.s, &to, &o, &map);
   for (int i = 0; i < map.quality.candidates; i++) assert_false(map.quality.candidate[i].reflected);
-  assert_true(ep_frame_determinant(map.rotation) > 0);
+  assert_true(ep_determinant3(map.rotation) > 0);
   ep_map_free(&map);
   o.reflections = true;
   match(&from.s, &to, &o, &map);
@@ -485,10 +486,10 @@ static void reflections_are_found_on_request(void **state) {
       proper = fmin(proper, f->score);
   }
   printf("mirrored frames: best score %.3f, proper ones %.3f; chosen det %.0f, %d wrong\n", least,
-         proper, ep_frame_determinant(map.rotation), count_wrong(&map, order));
+         proper, ep_determinant3(map.rotation), count_wrong(&map, order));
   assert_int_equal(mirrored, 4);
   assert_true(least < proper); // the mirrored frame is exact
-  assert_true(map.quality.verdict != EP_MAP_GOOD || ep_frame_determinant(map.rotation) < 0);
+  assert_true(map.quality.verdict != EP_MAP_GOOD || ep_determinant3(map.rotation) < 0);
   ep_map_free(&map);
   free(order);
   shape_free(&to);
