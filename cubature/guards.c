@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/forest.h"
 #include "base/random.h"
 #include "cubature/guard_model.h"
 
@@ -37,7 +38,7 @@ typedef struct chooser {
   double *u;             // (3 nv) scratch
   double *force, *start; // (r) of the push at hand
   double *now;           // (r) its force in this step
-  int *root, *worst;     // (nv) clusters: union-find over vertices, element with the least J
+  int *parent, *worst;   // (nv) clusters: forest over vertices, element with the least J
   bool full;
   long effort_end; // of the push at hand: evaluations and guards at which it ends
   int guards_end;
@@ -108,26 +109,22 @@ typedef struct outcome {
   bool failed;      // a step did not converge, or left what is no number: it ended there
 } outcome;
 
-static int find(int *root, int v) {
-  while (root[v] != v) v = root[v] = root[root[v]];
-  return v;
-}
-
 // The worst element of every cluster of inverted ones (they hang together by vertices) becomes a
 // guard. Returns how many were added.
 static int add_worst(chooser *c) {
   ep_guard_model *m = &c->model;
   const ep_mesh *mesh = m->fem->mesh;
   int added = 0;
-  for (int v = 0; v < mesh->nv; v++) c->root[v] = v, c->worst[v] = -1;
+  ep_forest_start(c->parent, mesh->nv);
+  for (int v = 0; v < mesh->nv; v++) c->worst[v] = -1;
   for (int e = 0; e < mesh->nt; e++)
     for (int i = 1; i < 4 && m->ratio[e] <= 0; i++)
-      c->root[find(c->root, mesh->tet[4 * e + i])] = find(c->root, mesh->tet[4 * e]);
+      ep_forest_join(c->parent, mesh->tet[4 * e], mesh->tet[4 * e + i]);
   for (int e = 0; e < mesh->nt; e++) {
     if (m->ratio[e] > 0 || m->allowed[e] == 0) continue;
     int known = 0;
     for (int i = 0; i < m->model.size.guards; i++) known |= m->tet[i] == e;
-    int *worst = &c->worst[find(c->root, mesh->tet[4 * e])];
+    int *worst = &c->worst[ep_forest_root(c->parent, mesh->tet[4 * e])];
     if (!known && (*worst < 0 || m->ratio[e] < m->ratio[*worst])) *worst = e;
   }
   for (int v = 0; v < mesh->nv; v++) {
@@ -260,12 +257,12 @@ static ep_status prepare(chooser *c, const ep_mesh *mesh, int r, ep_error *err) 
   c->mass = malloc(nv * sizeof *c->mass);
   c->u = malloc(3 * nv * sizeof *c->u);
   c->force = malloc(3 * (size_t)r * sizeof *c->force);
-  c->root = malloc(2 * nv * sizeof *c->root);
-  if (!c->mass || !c->u || !c->force || !c->root)
+  c->parent = malloc(2 * nv * sizeof *c->parent);
+  if (!c->mass || !c->u || !c->force || !c->parent)
     return ep_fail(err, EP_ERR_MEMORY, "no memory to choose guards");
   c->start = c->force + r;
   c->now = c->start + r;
-  c->worst = c->root + nv;
+  c->worst = c->parent + nv;
   ep_mesh_vertex_volumes(mesh, c->mass);
   return EP_OK;
 }
@@ -290,7 +287,7 @@ ep_status ep_guards_choose(const ep_fem *fem, const ep_basis *basis, const ep_cu
   free(c.mass);
   free(c.u);
   free(c.force);
-  free(c.root);
+  free(c.parent);
   if (status != EP_OK) ep_guards_free(out);
   return status;
 }

@@ -12,7 +12,7 @@ static const int stage_version[] = {
     [EP_STAGE_EIGEN] = 1, [EP_STAGE_MAP] = 9,    [EP_STAGE_POSES] = 5,    [EP_STAGE_MODES] = 1,
     [EP_STAGE_PATHS] = 2, [EP_STAGE_BASIS] = 2,  [EP_STAGE_CUBATURE] = 2, [EP_STAGE_GREEN] = 1,
     [EP_STAGE_MODEL] = 8, [EP_STAGE_CUBIC] = 1,  [EP_STAGE_TARGET] = 1,   [EP_STAGE_CONTACT] = 1,
-    [EP_STAGE_FRAME] = 1, [EP_STAGE_GUARDS] = 9,
+    [EP_STAGE_FRAME] = 1, [EP_STAGE_GUARDS] = 10,
 };
 
 const char *ep_stage_kind_name(ep_stage_kind kind) {
