@@ -18,12 +18,16 @@
 #include <cmocka.h>
 // clang-format on
 
+#include "reduced/contact_law.h"
 #include "tests/petsc_session.h"
 #include "tests/properties/baked_scene.h"
 
 // Over the extent. Steps and targets are found to 1e-11, and most shapes agree to 1e-12; what
 // impacts magnify stays below 1e-7 (of 400 scenes one above 1e-8). A basis that goes by the axes
 // moved the shapes of 29 scenes in 40 by 1e-6 to 0.2.
+// Steps with friction are solved again until the normal forces change by less than
+// EP_FRICTION_TOLERANCE: on the last bit it hangs whether once more, and then the way of the
+// vertices differs by that share (seed 100349: 2.6e-4 of the extent).
 static const double same = 1e-7;
 
 static int refused; // scenes whose integrator refused a step, at home and there
@@ -74,7 +78,27 @@ static bool moves(const random_scene *s, const placement *at, const char *folder
   return good;
 }
 
-static bool agree(const motion *home, const motion *there, char *why) {
+static double distance(const double *a, const double *b) {
+  return hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+}
+
+// How far a vertex gets from where it starts, over the extent.
+static double longest_way(const motion *m) {
+  const size_t nv = (size_t)m->nv;
+  double longest = 0;
+  for (size_t i = 0; i < nv * (size_t)m->rows; i++)
+    longest = fmax(longest, distance(m->x + 3 * i, m->x + 3 * (i % nv)));
+  return longest / m->extent;
+}
+
+static bool rubs(const random_scene *s) {
+  for (int i = 0; i < s->obstacles; i++)
+    if (s->obstacle[i].friction > 0) return true;
+  return false;
+}
+
+static bool agree(const motion *home, const motion *there, bool rubbing, char *why) {
+  const double bound = rubbing ? fmax(same, EP_FRICTION_TOLERANCE * longest_way(home)) : same;
   if (home->nv != there->nv || home->rows != there->rows)
     return breaks(why, "%d steps at home, %d there", home->rows - 1, there->rows - 1);
   if (!(fabs(home->extent - there->extent) < 1e-12 * home->extent))
@@ -83,8 +107,8 @@ static bool agree(const motion *home, const motion *there, char *why) {
     for (int v = 0; v < home->nv; v++) {
       const double *a = home->x + 3 * ((size_t)row * (size_t)home->nv + (size_t)v);
       const double *b = there->x + (a - home->x);
-      const double off = hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]) / home->extent;
-      if (!(off < same))
+      const double off = distance(a, b) / home->extent;
+      if (!(off < bound))
         return breaks(why, "step %d: vertex %d is %.3g of the extent off", row, v + 1, off);
     }
   return true;
@@ -99,7 +123,7 @@ static bool moves_the_same(const random_scene *s, const char *folder, bool loose
   snprintf(name[0], sizeof name[0], "%s/home", folder);
   snprintf(name[1], sizeof name[1], "%s/there", folder);
   const bool baked = moves(s, &stays, name[0], &home, why) && moves(s, &at, name[1], &there, why);
-  const bool good = baked ? agree(&home, &there, why) : loose;
+  const bool good = baked ? agree(&home, &there, rubs(s), why) : loose;
   if (baked && !loose) refused += home.rows <= s->steps;
   free(home.x);
   free(there.x);

@@ -3,8 +3,8 @@
 //   force, the Green-strain potential and dragging springs (of free objects f by translation and
 //   turning too, K by translation);
 //   rest stays at rest; free objects keep both momenta, and under gravity and pushes gain exactly
-//   sum dt F; energy without load never grows with implicit Euler (of spinning objects by a
-//   share of the deformation's at most); same steps, same bytes;
+//   sum dt F; energy without load never grows with implicit Euler (of spinning objects by
+//   an error of the step that vanishes as it gets finer); same steps, same bytes;
 //   a pressure all around is -p dV/dq: f_0 and B are the first and second derivative of the volume.
 #include <math.h>
 #include <setjmp.h>
@@ -337,29 +337,42 @@ static bool loads_change_momentum_by_their_impulse(baked_scene *b, ep_random *rn
           breaks(why, "momentum %g of %g", distance(after, none), distance(expected, none)));
 }
 
-// Of a spinning object a step takes the frame's part in the motion from its beginning, so that the
-// energy of deformation and that of the spin exchange a share not balanced within it, to both
-// sides: .07 of the deformation's was seen (seed 100175).
-static bool energy_never_grows(baked_scene *b, ep_random *rng, char *why) {
+// Largest growth of the energy in a step of 1 / parts of the scene's, over the most there was; NAN
+// where a step fails. The state is stirred by a copy of rng: always the same one.
+static double energy_growth(baked_scene *b, ep_random rng, int parts) {
   ep_stepper *s = fresh(b);
   ep_step_def *def = ep_stepper_def(s);
   ep_advance done;
   def->integrator = EP_IMPLICIT_EULER;
   def->strength = 0; // the target of the examples follows the object: no fixed potential
-  stir(b, rng, 0.03, s);
-  double before = 0, most = 0;
-  bool good = true, on = true;
-  for (int i = 0; i < 2 * STEPS && good; i++) {
-    good = advance(s, b, i, false, &done, &on, why);
+  stir(b, &rng, 0.03, s);
+  const double dt = b->from->dt / parts;
+  double before = INFINITY, most = 0, growth = 0;
+  ep_status status = EP_OK;
+  for (int i = 0; i < 2 * STEPS * parts && status == EP_OK; i++) {
+    status = ep_stepper_advance(s, i * dt, dt, false, &done);
     const double now = done.last.elastic_energy + done.last.green_energy + done.last.kinetic_energy;
     most = fmax(most, fabs(now));
-    const double coupled = b->file.model.size.rigid ? 0.2 * (now - done.last.kinetic_energy) : 0;
-    if (good && i > 0 && now - before > 1e-6 * most + coupled)
-      good = breaks(why, "step %d: energy grows from %.9g to %.9g", i, before, now);
+    growth = fmax(growth, now - before);
     before = now;
   }
   ep_stepper_close(s);
-  return good;
+  return status == EP_OK ? growth / most : NAN;
+}
+
+// Held objects never. Of a spinning one the exchange of energy between spin and deformation is
+// balanced to the order of the step only: what a coarse step makes must fall as it gets finer, by 8
+// at least for a quarter of it. (Seed 100175 turns .1 to .2 a step: 8e-4, halved 4e-5, then 0.)
+static bool energy_never_grows(baked_scene *b, ep_random *rng, char *why) {
+  const ep_random start = *rng;
+  const double growth = energy_growth(b, start, 1);
+  if (growth <= 1e-6) return true;
+  if (isnan(growth)) return breaks(why, "a step without loads fails");
+  if (!model_of(b)->size.rigid) return breaks(why, "energy grows by %.3g of its largest", growth);
+  const double fine = energy_growth(b, start, 4);
+  return fine <= fmax(1e-6, growth / 8) ||
+         breaks(why, "energy grows by %.3g of its largest, by %.3g with a quarter of the step",
+                growth, fine);
 }
 
 static bool steps_repeat_to_the_bit(baked_scene *b, ep_random *rng, char *why) {
