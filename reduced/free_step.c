@@ -54,7 +54,7 @@ static void predict3(const ep_free_step *f, const double q[3], const double v[3]
                             .a = a,
                             .q_before = q_before,
                             .v_before = v_before,
-                            .dt_before = f->state->dt_before};
+                            .dt_before = f->dt_before};
   ep_integrator_predict(f->def->integrator, 3, f->def->dt, &motion, base, ahead, &rate, &inertia);
 }
 
@@ -164,10 +164,29 @@ static void start_acceleration(ep_free_step *f, const double omega[3]) {
   }
 }
 
+// Origin of the damping by stiffness, which acts on q' = rate (x - origin) itself. The same rate as
+// P - C(omega) q would follow the rotation, and the rotation the iterate: times a bulk modulus that
+// changes forces by more than Newton gains (nearly incompressible bodies took 25 to 80 iterations
+// a step in free flight, and may have found no step at all).
+static void damp_from(ep_free_step *f) {
+  ep_state *state = f->state;
+  double rate, inertia;
+  const ep_motion motion = {.q = state->q,
+                            .v = state->v,
+                            .a = state->a,
+                            .q_before = state->free_q_before,
+                            .v_before = state->v_before,
+                            .dt_before = f->dt_before};
+  ep_integrator_predict(f->def->integrator, (size_t)state->model->size.r, f->def->dt, &motion,
+                        state->free_still, state->free_scratch, &rate, &inertia);
+}
+
 void ep_free_begin(ep_free_step *f, ep_state *state, const ep_step_def *def) {
   const size_t r = (size_t)state->model->size.r;
   double omega[3], velocity[3], acceleration[3], before[3];
   *f = (ep_free_step){.state = state, .def = def, .mass = state->model->rigid_mass[0]};
+  // what a step of another integrator left is not in the axes of its end
+  f->dt_before = def->integrator == EP_BDF2 && !state->before_turned ? 0 : state->dt_before;
   start_momentum(f, omega);
   if (!f->sound) return;
   if (def->integrator == EP_NEWMARK && state->dt_before == 0) start_acceleration(f, omega);
@@ -176,11 +195,12 @@ void ep_free_begin(ep_free_step *f, ep_state *state, const ep_step_def *def) {
                             .a = state->a,
                             .q_before = state->q_before,
                             .v_before = state->v_before,
-                            .dt_before = state->dt_before};
+                            .dt_before = f->dt_before};
   ep_integrator_predict(def->integrator, r, def->dt, &motion, state->free_base, state->free_ahead,
                         &f->rate, &f->inertia);
+  damp_from(f);
   f->turn_inertia = f->inertia;
-  if (def->integrator == EP_BDF2 && state->dt_before > 0) f->turn_inertia = 2 * f->rate / def->dt;
+  if (def->integrator == EP_BDF2 && f->dt_before > 0) f->turn_inertia = 2 * f->rate / def->dt;
   for (int i = 0; i < 3; i++) {
     velocity[i] = state->linear[i] / f->mass;
     acceleration[i] = state->linear_rate[i] / f->mass;
@@ -351,10 +371,6 @@ void ep_free_freeze(ep_free_step *f, const double *x, const double *rotation) {
   if (!f->sound) return;
   inertial_forces(f, x, f->omega, f->turned, state->free_ds, state->free_force);
   fill_softening(state, f->omega);
-  // q' = p - C q: what the damping by stiffness acts on, as a shift of its origin.
-  times(r, state->free_c, x, state->free_drift);
-  for (int a = 0; a < r; a++)
-    state->free_drift[a] = state->base[a] + state->free_drift[a] / f->rate;
 }
 
 // a . M b for symmetric M (9).
@@ -431,7 +447,9 @@ static void finish_rigid(ep_free_step *f, const ep_frame *found) {
 void ep_free_finish(ep_free_step *f, const double *x, const ep_frame *found) {
   ep_state *state = f->state;
   const int r = state->model->size.r;
-  if (f->def->integrator == EP_BDF2) { // the motion before, in the axes of the step's end
+  state->before_turned = f->def->integrator == EP_BDF2;
+  if (state->before_turned) { // the motion before, in the axes of the step's end
+    memcpy(state->free_q_before, state->q, (size_t)r * sizeof *x);
     fill_mean_coriolis(f, state->free_n);
     memcpy(state->q_before, state->q, (size_t)r * sizeof *x);
     memcpy(state->v_before, state->free_p, (size_t)r * sizeof *x);

@@ -28,6 +28,7 @@ typedef struct ep_free_step {
   ep_state *state;
   const ep_step_def *def;
   double rate, inertia; // of the integrator
+  double dt_before;     // of the step before; 0: none that counts
   // inertia of the rotation: a torque outside at the end turns the step by J^-1 torque /
   // turn_inertia: half its impulse where psi follows the mean momentum (Newmark, BDF2), all of it
   // for implicit Euler

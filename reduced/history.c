@@ -6,7 +6,7 @@
 
 #include "reduced/state.h"
 
-enum { LAYOUT = 1 }; // the first number: another list has another
+enum { LAYOUT = 2 }; // the first number: another list has another
 
 typedef struct cursor {
   double *to; // both NULL: count only
@@ -36,6 +36,8 @@ static void pass_motion(cursor *c, ep_state *s) {
   pass(c, s->c_before, 3);
   pass(c, s->linear_before, 3);
   pass(c, s->angular_before, 3);
+  if (s->model->size.rigid) pass(c, s->free_q_before, (size_t)s->model->size.r);
+  pass_int(c, &s->before_turned);
 }
 
 static void pass_unfold(cursor *c, ep_state *s) {

@@ -80,11 +80,12 @@
   X(outer_g, n)            /* gradient of potentials outside the object */                        \
   X(inner_g, free ? n : 0) /* free motion: gradient without what is frozen, and */                \
   X(free_p, free)          /* reduced/free_step.h: momentum, unturned base and ahead at the */    \
-  X(free_base, free)       /* start; where it was frozen, force, origin of the damping; C, */      \
-  X(free_ahead, free)      /* softening; dS/dq, H, G */                                           \
+  X(free_base, free)       /* start; where it was frozen, force, origin of the damping, q at the */ \
+  X(free_ahead, free)      /* start of the step before; C, softening; dS/dq, H, G */              \
   X(free_at, free)                                                                                \
   X(free_force, free)                                                                             \
-  X(free_drift, free)                                                                             \
+  X(free_still, free)                                                                             \
+  X(free_q_before, free)                                                                          \
   X(free_scratch, free)                                                                           \
   X(free_c, free * free)                                                                          \
   X(free_n, free * free)                                                                          \
@@ -127,7 +128,8 @@ struct ep_state {
   double angular[3];
   double linear_rate[3], angular_rate[3]; // of the last step, without contact (Newmark)
   double c_before[3], linear_before[3], angular_before[3]; // at its beginning (BDF2)
-  int touched;                                             // something outside acted in it
+  int before_turned; // q_before, v_before are in the axes of the last step's end (BDF2)
+  int touched;       // something outside acted in it
 #define X(name, count) double *name;
   EP_STATE_ARRAYS(X)
 #undef X

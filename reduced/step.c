@@ -110,7 +110,7 @@ static double moving_energy(ep_step_run *s, double sum, const double *x, double 
   const int r = state->model->size.r;
   const double inertia = s->inertia, drag = def->damping_mass * s->rate;
   const double viscous = damping_stiffness(s) * s->rate;
-  const double *origin = s->free ? state->free_drift : state->base;
+  const double *origin = s->free ? state->free_still : state->base;
   if (viscous > 0) sum += 0.5 * viscous * add_k0(s, viscous, x, origin, g);
   for (int a = 0; a < r; a++) {
     double ahead = x[a] - state->aside[a], moved = x[a] - state->base[a];
