@@ -189,6 +189,7 @@ void ep_free_begin(ep_free_step *f, ep_state *state, const ep_step_def *def) {
   f->dt_before = def->integrator == EP_BDF2 && !state->before_turned ? 0 : state->dt_before;
   start_momentum(f, omega);
   if (!f->sound) return;
+  memcpy(f->omega_start, omega, sizeof omega);
   if (def->integrator == EP_NEWMARK && state->dt_before == 0) start_acceleration(f, omega);
   const ep_motion motion = {.q = state->q,
                             .v = state->free_p,
@@ -344,33 +345,62 @@ static void turn_both(const ep_free_step *f, const double *c, double *a, double 
   turn(r, c, -f->def->dt, b, state->work, state->free_scratch);
 }
 
-void ep_free_freeze(ep_free_step *f, const double *x, const double *rotation) {
+// omega at the end of the step, of its momenta. 0 where the deformation could turn the body alone.
+static int spin_at_end(ep_free_step *f, const double *x) {
   ep_state *state = f->state;
   const int r = state->model->size.r;
-  const size_t bytes = (size_t)r * sizeof *x;
-  double s[6], l[3], l_body[3];
-  memcpy(state->free_at, x, bytes);
-  f->sound = free_rotation(f, x);
-  if (!f->sound) return;
-  memset(f->zeta, 0, sizeof f->zeta);
-  if (rotation) {
-    difference_of(f->turned, rotation, f->zeta);
-    memcpy(f->turned, rotation, sizeof f->turned);
-  }
+  double l[3], l_body[3];
+  end_momentum(f, f->angular_ahead, f->torque, f->contact + 3, l);
+  ep_rotate_back(f->turned, l, l_body);
+  for (int a = 0; a < r; a++) state->free_scratch[a] = f->rate * (x[a] - state->base[a]);
+  return spin_of_momenta(r, f->j, state->free_h, l_body, state->free_scratch, f->omega);
+}
+
+// The same of the rotation: of free flight (free_turn: twice the mean less that at the start), and
+// what the world turned on its way. An iterate deep in an obstacle feels a torque that no step ends
+// with; taken for spin, its centrifugal force would drive the iterates apart.
+static void spin_of_rotation(ep_free_step *f, const double free_turn[3]) {
+  const double outside = f->turn_inertia / f->rate;
+  for (int i = 0; i < 3; i++)
+    f->omega[i] = 2 * free_turn[i] / f->def->dt - f->omega_start[i] + outside * f->zeta[i];
+}
+
+// base and ahead in the axes of the step's end.
+static void turn_predictions(ep_free_step *f) {
+  ep_state *state = f->state;
+  const size_t bytes = (size_t)state->model->size.r * sizeof(double);
   fill_mean_coriolis(f, state->free_c);
   memcpy(state->base, state->free_base, bytes);
   memcpy(state->aside, state->free_ahead, bytes);
   turn_both(f, state->free_c, state->base, state->aside);
+}
+
+void ep_free_freeze(ep_free_step *f, const double *x, const double *rotation) {
+  ep_state *state = f->state;
+  double s[6], free_turn[3];
+  memcpy(state->free_at, x, (size_t)state->model->size.r * sizeof *x);
+  f->sound = free_rotation(f, x);
+  if (!f->sound) return;
+  memset(f->zeta, 0, sizeof f->zeta);
+  if (rotation) {
+    difference_of(state->frame.R, f->turned, free_turn);
+    difference_of(f->turned, rotation, f->zeta);
+    memcpy(f->turned, rotation, sizeof f->turned);
+  }
+  turn_predictions(f);
   ep_rigid_sums(state->model, x, s, state->free_ds, state->free_h);
   ep_rigid_tensor(s, f->j);
-  end_momentum(f, f->angular_ahead, f->torque, f->contact + 3, l);
-  ep_rotate_back(f->turned, l, l_body);
-  for (int a = 0; a < r; a++) state->free_scratch[a] = f->rate * (x[a] - state->base[a]);
-  f->sound = ep_inverse3(f->j, f->j_inverse) &&
-             spin_of_momenta(r, f->j, state->free_h, l_body, state->free_scratch, f->omega);
+  f->sound = ep_inverse3(f->j, f->j_inverse) && (rotation || spin_at_end(f, x));
   if (!f->sound) return;
+  if (rotation) spin_of_rotation(f, free_turn);
   inertial_forces(f, x, f->omega, f->turned, state->free_ds, state->free_force);
   fill_softening(state, f->omega);
+}
+
+int ep_free_settle(ep_free_step *f, const double *x) {
+  if (!spin_at_end(f, x)) return 0;
+  fill_coriolis(f->state->model, f->omega, f->state->free_c);
+  return 1;
 }
 
 // a . M b for symmetric M (9).

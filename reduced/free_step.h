@@ -27,8 +27,9 @@
 typedef struct ep_free_step {
   ep_state *state;
   const ep_step_def *def;
-  double rate, inertia; // of the integrator
-  double dt_before;     // of the step before; 0: none that counts
+  double rate, inertia;  // of the integrator
+  double dt_before;      // of the step before; 0: none that counts
+  double omega_start[3]; // body axes
   // inertia of the rotation: a torque outside at the end turns the step by J^-1 torque /
   // turn_inertia: half its impulse where psi follows the mean momentum (Newmark, BDF2), all of it
   // for implicit Euler
@@ -62,8 +63,12 @@ double ep_free_energy(const ep_free_step *f, const double *x, int joint, double 
 // The centre of mass at the end of the step, free of contact.
 void ep_free_center(const ep_free_step *f, double c[3]);
 
+// With contact: omega at the end of the step by its momenta, x and contact found; while they were
+// looked for it went by the rotation. 0: there is none, and the state is as it was.
+int ep_free_settle(ep_free_step *f, const double *x);
+
 // Into the state: momenta, frame, acceleration of the rigid motion, velocity (q' from p at x).
-// rotated: NULL in free flight, else c and R found with contact.
+// found: NULL in free flight, else c and R with contact.
 void ep_free_finish(ep_free_step *f, const double *x, const ep_frame *found);
 
 // Kinetic energy of the state.

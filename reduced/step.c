@@ -279,7 +279,7 @@ static void finish_held(ep_step_run *s) {
   }
 }
 
-static void finish(ep_step_run *s, ep_contact_report *contact) {
+static ep_status finish(ep_step_run *s, ep_contact_report *contact) {
   ep_state *state = s->state;
   const ep_frame *frame = s->free ? (s->joint ? &s->iterate : &state->frame) : NULL;
   const int newmark = s->def->integrator == EP_NEWMARK;
@@ -288,6 +288,7 @@ static void finish(ep_step_run *s, ep_contact_report *contact) {
     touched = ep_joint_finish(s);
   else if (s->contact && !s->free && newmark)
     contact_gradient(s);
+  if (s->joint && !ep_free_settle(&s->motion, state->x)) return EP_ERR_NUMERIC;
   if (s->contact && (!s->free || s->joint))
     ep_contact_measure(state, s->def, frame, state->x, contact);
   if (s->free)
@@ -299,6 +300,7 @@ static void finish(ep_step_run *s, ep_contact_report *contact) {
   state->touched = touched;
   state->dt_before = s->def->dt;
   if (s->examples) ep_commit_target(state);
+  return EP_OK;
 }
 
 // What the model cannot do with its regions: act on a part of the object by K0 or by polynomials.
@@ -416,11 +418,11 @@ ep_status ep_step(ep_state *state, const ep_step_def *given, ep_step_report *rep
   choose_start(&s);
   status = minimise(&s, &newton);
   set_report(&s, &newton, report);
+  if (status == EP_OK) status = finish(&s, &report->contact);
   if (status != EP_OK) {
     state->unfold = before;
     return status;
   }
-  finish(&s, &report->contact);
   ep_unfold_end(state, calm);
   report->kinetic_energy =
       s.free ? ep_free_kinetic(state) : 0.5 * ep_dot(size->r, state->v, state->v);
