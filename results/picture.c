@@ -248,29 +248,54 @@ static void resolve(const ep_frame *frame, int samples, const ep_shadow *shadow,
     }
 }
 
+static double height_of(const ep_view *view, const double *p) {
+  return dot(view->up, p) / sqrt(dot(view->up, view->up));
+}
+
+// A floor and the shadow of everything else on its upper side.
+static ep_status draw_floor(const ep_view *view, const ep_panel *panel, const ep_drawing *d,
+                            ep_frame *frame, const ep_camera *camera, ep_error *err) {
+  ep_shadow shadow;
+  double top = -DBL_MAX;
+  EP_TRY(ep_frame_draw(frame, camera, d, 1.1 * view->samples, err));
+  if (!view->shadow) return EP_OK;
+  for (int j = 0; j < 3 * d->nt; j++)
+    top = fmax(top, height_of(view, d->x + 3 * (size_t)d->triangle[j]));
+  EP_TRY(ep_shadow_make(view, camera, panel, top, &shadow, err));
+  ep_shadow_fall(&shadow, camera, frame);
+  ep_shadow_free(&shadow);
+  return EP_OK;
+}
+
 static ep_status draw_panel(const ep_view *view, const ep_panel *panel, ep_frame *frame,
                             const ep_camera *camera, double ground, ep_image *image, int left,
                             int top, ep_error *err) {
+  int floors = 0;
   memset(frame->color, 0, (size_t)frame->width * (size_t)frame->height * 3 * sizeof(float));
   for (size_t i = 0; i < (size_t)frame->width * (size_t)frame->height; i++)
     frame->depth[i] = -FLT_MAX;
+  for (int i = 0; i < panel->drawings; i++) {
+    if (!panel->drawing[i].floor) continue;
+    EP_TRY(draw_floor(view, panel, &panel->drawing[i], frame, camera, err));
+    floors++;
+  }
   for (int i = 0; i < panel->drawings; i++)
-    EP_TRY(ep_frame_draw(frame, camera, &panel->drawing[i], 1.1 * view->samples, err));
+    if (!panel->drawing[i].floor)
+      EP_TRY(ep_frame_draw(frame, camera, &panel->drawing[i], 1.1 * view->samples, err));
   ep_shadow shadow = {0};
-  if (view->shadow) EP_TRY(ep_shadow_make(view, camera, panel, ground, &shadow, err));
+  if (view->shadow && !floors) EP_TRY(ep_shadow_make(view, camera, panel, ground, &shadow, err));
   resolve(frame, view->samples, &shadow, camera, image, left, top);
   ep_shadow_free(&shadow);
   return EP_OK;
 }
 
 static double lowest(const ep_view *view, int first, int last, const ep_panel *panel) {
-  const double length = sqrt(dot(view->up, view->up));
   double low = DBL_MAX;
   for (int p = first; p <= last; p++)
     for (int i = 0; i < panel[p].drawings; i++) {
       const ep_drawing *d = &panel[p].drawing[i];
       for (int j = 0; j < 3 * d->nt; j++)
-        low = fmin(low, dot(view->up, d->x + 3 * (size_t)d->triangle[j]) / length);
+        low = fmin(low, height_of(view, d->x + 3 * (size_t)d->triangle[j]));
     }
   return low;
 }

@@ -17,6 +17,7 @@ typedef struct ep_drawing {
   double crease;       // edges sharper than this are shaded sharp [degrees]; 0: all flat
   float edges;         // darkness of triangle edges, 0 (none) .. 1
   const unsigned char *hidden_edges; // (nt) bit c set: do not draw the edge opposite corner c; NULL
+  bool floor; // level: the panel's other drawings cast their shadows on its upper side
 } ep_drawing;
 // No edges, crease at 40 degrees, a calm blue.
 ep_drawing ep_default_drawing(int nv, const double *x, int nt, const int *triangle);
@@ -33,7 +34,7 @@ typedef struct ep_view {
   double perspective;      // field of view [degrees], 0: parallel projection
   bool shared;             // one frame (scale and centre) for all panels: shapes can be compared;
                            // otherwise every panel is fitted to its own content
-  bool shadow;             // soft shadow on a ground plane below (along -up) the lowest point
+  bool shadow;             // soft shadow on floors, or on a plane below (along -up) all points
   double margin;           // free share of the panel's smaller side on each side
   int width, height;       // of one panel's drawing [pixels]
   int columns;             // panels in a row; 0: all in one

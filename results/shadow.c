@@ -78,7 +78,7 @@ static void blur(ep_shadow *s, int radius) {
 static void visit_triangles(ep_shadow *s, const ep_panel *panel, bool measure, double *high) {
   for (int i = 0; i < panel->drawings; i++) {
     const ep_drawing *d = &panel->drawing[i];
-    for (int t = 0; t < d->nt; t++) {
+    for (int t = 0; t < d->nt && !d->floor; t++) {
       double g[3][2];
       for (int c = 0; c < 3; c++) cast(s, d->x + 3 * (size_t)d->triangle[3 * t + c], g[c]);
       for (int c = 0; c < 3 && measure; c++)
@@ -124,9 +124,9 @@ static double fade(const ep_frame *frame, double x, double y) {
   return t * t * (3 - 2 * t);
 }
 
-double ep_shadow_at(const ep_shadow *s, const ep_camera *camera, const ep_frame *frame, double x,
-                    double y) {
-  if (s->size == 0) return 0;
+// Where the ground is seen at a sample, p (3); false: nowhere.
+static bool seen_at(const ep_shadow *s, const ep_camera *camera, const ep_frame *frame, double x,
+                    double y, double p[3]) {
   const double a = (x - frame->width / 2.0 - camera->offset[0]) / camera->scale;
   const double b = -(y - frame->height / 2.0 - camera->offset[1]) / camera->scale;
   double origin[3], ray[3];
@@ -137,19 +137,43 @@ double ep_shadow_at(const ep_shadow *s, const ep_camera *camera, const ep_frame 
     ray[k] = camera->distance > 0 ? across - eye : -camera->back[k];
   }
   const double slope = dot(ray, s->up);
-  if (!(slope < -1e-6 * sqrt(dot(ray, ray)))) return 0; // never meets the ground from above
+  if (!(slope < -1e-6 * sqrt(dot(ray, ray)))) return false; // never meets the ground from above
   const double t = (s->ground - dot(origin, s->up)) / slope;
-  if (!(t > 0) && camera->distance > 0) return 0;
+  for (int k = 0; k < 3; k++) p[k] = origin[k] + t * ray[k];
+  return t > 0 || camera->distance == 0;
+}
+
+// How dark the ground is at a point of it.
+static double dark_at(const ep_shadow *s, const double p[3]) {
   double g[2];
-  for (int k = 0; k < 2; k++) {
-    double at = dot(origin, s->axis[k]) + t * dot(ray, s->axis[k]);
-    g[k] = (at - s->low[k]) / s->cell - 0.5;
-  }
+  for (int k = 0; k < 2; k++) g[k] = (dot(p, s->axis[k]) - s->low[k]) / s->cell - 0.5;
   if (!(g[0] >= 0 && g[1] >= 0 && g[0] < s->size - 1 && g[1] < s->size - 1)) return 0;
   const int i = (int)g[0], j = (int)g[1];
   const double fx = g[0] - i, fy = g[1] - j;
   const float *d = s->dark + (size_t)j * (size_t)s->size + i;
   const double low = (double)d[0] * (1 - fx) + (double)d[1] * fx;
   const double high = (double)d[s->size] * (1 - fx) + (double)d[s->size + 1] * fx;
-  return fade(frame, x, y) * darkness * (low * (1 - fy) + high * fy);
+  return darkness * (low * (1 - fy) + high * fy);
+}
+
+double ep_shadow_at(const ep_shadow *s, const ep_camera *camera, const ep_frame *frame, double x,
+                    double y) {
+  double p[3];
+  if (s->size == 0 || !seen_at(s, camera, frame, x, y, p)) return 0;
+  return fade(frame, x, y) * dark_at(s, p);
+}
+
+void ep_shadow_fall(const ep_shadow *s, const ep_camera *camera, ep_frame *frame) {
+  // a cell's width, in units of depth; sides of a floor are further off but at its edges
+  const double near = camera->distance > 0 ? s->cell / camera->distance : s->cell;
+  for (int y = 0; y < frame->height && s->size; y++)
+    for (int x = 0; x < frame->width; x++) {
+      const size_t at = (size_t)y * (size_t)frame->width + (size_t)x;
+      double p[3], screen[3];
+      if (frame->depth[at] == -FLT_MAX || !seen_at(s, camera, frame, x + 0.5, y + 0.5, p)) continue;
+      ep_camera_project(camera, frame, p, screen);
+      if (!(fabs(screen[2] - (double)frame->depth[at]) < near)) continue;
+      const float light = (float)(1 - dark_at(s, p));
+      for (size_t k = 0; k < 3; k++) frame->color[3 * at + k] *= light;
+    }
 }

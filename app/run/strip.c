@@ -23,14 +23,15 @@ typedef struct stage {
 typedef struct shot {
   double *x; // the object (n x 3), then the obstacles
   char label[LABEL];
-  ep_drawing drawing[2];
+  ep_drawing *drawing; // the object's, then each obstacle's
   ep_panel panel;
 } shot;
 
 static ep_status make_shot(const stage *s, shot *out, ep_error *err) {
   const size_t n = 3 * (size_t)s->mesh->nv;
   *out = (shot){.x = calloc(n + 3 * (size_t)s->solids->mesh.nv + 1, sizeof(double))};
-  if (!out->x) return ep_fail(err, EP_ERR_MEMORY, "no memory for the pictures");
+  out->drawing = calloc((size_t)s->scene->nobstacles + 1, sizeof *out->drawing);
+  if (!out->x || !out->drawing) return ep_fail(err, EP_ERR_MEMORY, "no memory for the pictures");
   out->drawing[0] = ep_default_drawing(s->mesh->nv, out->x, s->triangles, s->triangle);
   return EP_OK;
 }
@@ -39,19 +40,35 @@ static void finish_shot(shot *out, int drawings) {
   out->panel = (ep_panel){.drawings = drawings, .drawing = out->drawing, .label = out->label};
 }
 
+// x: positions of all obstacles at time t. A plane that is level is a floor.
+static void draw_obstacle(const stage *s, int i, double t, const double *x, ep_drawing *out) {
+  static const float grey[2][3] = {{0.62f, 0.63f, 0.64f}, {0.78f, 0.78f, 0.76f}}; // body, floor
+  const int first = s->solids->first_triangle[i], end = s->solids->first_triangle[i + 1];
+  const ep_view view = ep_default_view();
+  ep_frame pose;
+  double level = 0;
+  ep_obstacle_pose(&s->scene->obstacle[i], t, &pose);
+  for (int k = 0; k < 3; k++) level += pose.R[3 * k + 2] * view.up[k];
+  *out = ep_default_drawing(s->solids->mesh.nv, x, end - first,
+                            s->solids->triangle + 3 * (size_t)first);
+  out->floor = s->scene->obstacle[i].kind == EP_OBSTACLE_PLANE && level > 0.9999;
+  memcpy(out->tint, grey[out->floor], sizeof grey[0]);
+}
+
+static void drop_shot(shot *out) {
+  free(out->x);
+  free(out->drawing);
+}
+
 static ep_status shoot_moment(const stage *s, int row, shot *out, ep_error *err) {
   EP_TRY(make_shot(s, out, err));
   ep_record_positions(s->model, s->record, row, out->x);
   snprintf(out->label, LABEL, "t = %.2f s", s->record->time[row]);
-  if (s->solids->triangles) {
-    const float grey[3] = {0.72f, 0.72f, 0.70f};
-    double *there = out->x + 3 * (size_t)s->mesh->nv;
-    ep_solids_place(s->scene, s->solids, s->record->time[row], there);
-    out->drawing[1] =
-        ep_default_drawing(s->solids->mesh.nv, there, s->solids->triangles, s->solids->triangle);
-    memcpy(out->drawing[1].tint, grey, sizeof grey);
-  }
-  finish_shot(out, s->solids->triangles ? 2 : 1);
+  ep_solids_place(s->scene, s->solids, s->record->time[row], out->x + 3 * (size_t)s->mesh->nv);
+  for (int i = 0; i < s->scene->nobstacles; i++)
+    draw_obstacle(s, i, s->record->time[row], out->x + 3 * (size_t)s->mesh->nv,
+                  &out->drawing[i + 1]);
+  finish_shot(out, s->scene->nobstacles + 1);
   return EP_OK;
 }
 
@@ -113,7 +130,7 @@ static ep_status write_strip(const char *folder, const stage *s, ep_error *err) 
     view.title = title;
     status = ep_picture_write(path, &view, count, panel, err);
   }
-  for (int i = 0; i < count && list; i++) free(list[i].x);
+  for (int i = 0; i < count && list; i++) drop_shot(&list[i]);
   free(list);
   free(panel);
   return status;
@@ -130,7 +147,7 @@ static ep_status write_final(const char *folder, const stage *s, ep_error *err) 
     view.height = 480;
     status = ep_picture_write(path, &view, 1, &last.panel, err);
   }
-  free(last.x);
+  drop_shot(&last);
   return status;
 }
 

@@ -174,6 +174,35 @@ static void test_shadow(void **state) {
   ep_image_free(&with);
 }
 
+// A cube over a floor: the floor is darkened where the shadow falls, nothing else changes.
+static void test_floor(void **state) {
+  (void)state;
+  double high[24], wide[24];
+  for (int i = 0; i < 24; i++) {
+    high[i] = cube_x[i] + (i % 3 == 1 ? 2 : 0);
+    wide[i] = i % 3 == 1 ? 0.1 * cube_x[i] : 6 * cube_x[i];
+  }
+  ep_drawing both[2] = {ep_default_drawing(8, high, 12, cube_triangle),
+                        ep_default_drawing(8, wide, 12, cube_triangle)};
+  both[1].floor = true;
+  const ep_panel panel = {2, both, NULL};
+  ep_view view = plain_view(160);
+  view.from[1] = 0.7;
+  ep_image without, with;
+  assert_int_equal(ep_picture_render(&view, 1, &panel, &without, NULL), EP_OK);
+  view.shadow = true;
+  assert_int_equal(ep_picture_render(&view, 1, &panel, &with, NULL), EP_OK);
+  assert_int_equal(not_white(&with, 0, 0, 160, 160), not_white(&without, 0, 0, 160, 160));
+  int darker = 0;
+  for (int i = 0; i < 3 * 160 * 160; i++) {
+    assert_true(with.rgb[i] <= without.rgb[i]);
+    darker += with.rgb[i] < without.rgb[i];
+  }
+  assert_true(darker > 200);
+  ep_image_free(&without);
+  ep_image_free(&with);
+}
+
 static void test_png(void **state) {
   (void)state;
   const ep_drawing cube = ep_default_drawing(8, cube_x, 12, cube_triangle);
@@ -270,6 +299,7 @@ int main(void) {
                                      cmocka_unit_test(test_depth),
                                      cmocka_unit_test(test_panels_and_labels),
                                      cmocka_unit_test(test_shadow),
+                                     cmocka_unit_test(test_floor),
                                      cmocka_unit_test(test_png),
                                      cmocka_unit_test(test_every_glyph),
                                      cmocka_unit_test(test_colors),
