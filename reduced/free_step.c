@@ -145,22 +145,21 @@ static void start_momentum(ep_free_step *f, double omega[3]) {
   }
 }
 
-// Newmark without a step before: accelerations of the equations of motion. state->a holds those of
-// the deformation alone (step.c), where the damping by mass saw q' instead of p.
-static void start_acceleration(ep_free_step *f, const double omega[3]) {
+// Newmark without a step before: accelerations of the equations of motion. a holds those of the
+// deformation alone (step.c), where the damping by mass saw q' instead of p.
+static void start_acceleration(ep_free_step *f, const double omega[3], double *a) {
   ep_state *state = f->state;
   const int r = state->model->size.r;
   const double drag = f->def->damping_mass;
   inertial_forces(f, state->q, omega, state->frame.R, state->free_ds, state->trial);
-  for (int a = 0; a < r; a++)
-    state->a[a] += state->trial[a] - drag * (state->free_p[a] - state->v[a]);
+  for (int i = 0; i < r; i++) a[i] += state->trial[i] - drag * (state->free_p[i] - state->v[i]);
   pull(f, state->q, state->frame.R);
   for (int i = 0; i < 3; i++) {
-    state->linear_rate[i] = f->force[i] - drag * state->linear[i];
-    state->angular_rate[i] = f->torque[i] - drag * state->angular[i];
+    f->linear_rate[i] = f->force[i] - drag * state->linear[i];
+    f->angular_rate[i] = f->torque[i] - drag * state->angular[i];
     if (!f->def->outer) continue; // step.c has evaluated it
-    state->linear_rate[i] -= state->outer_g[r + i];
-    state->angular_rate[i] -= state->outer_g[r + 3 + i];
+    f->linear_rate[i] -= state->outer_g[r + i];
+    f->angular_rate[i] -= state->outer_g[r + 3 + i];
   }
 }
 
@@ -173,7 +172,7 @@ static void damp_from(ep_free_step *f) {
   double rate, inertia;
   const ep_motion motion = {.q = state->q,
                             .v = state->v,
-                            .a = state->a,
+                            .a = f->a,
                             .q_before = state->free_q_before,
                             .v_before = state->v_before,
                             .dt_before = f->dt_before};
@@ -181,19 +180,24 @@ static void damp_from(ep_free_step *f) {
                         state->free_still, state->free_scratch, &rate, &inertia);
 }
 
-void ep_free_begin(ep_free_step *f, ep_state *state, const ep_step_def *def) {
+void ep_free_begin(ep_free_step *f, ep_state *state, const ep_step_def *def, double dt_before,
+                   double *a) {
   const size_t r = (size_t)state->model->size.r;
   double omega[3], velocity[3], acceleration[3], before[3];
-  *f = (ep_free_step){.state = state, .def = def, .mass = state->model->rigid_mass[0]};
-  // what a step of another integrator left is not in the axes of its end
-  f->dt_before = def->integrator == EP_BDF2 && !state->before_turned ? 0 : state->dt_before;
+  *f = (ep_free_step){.state = state,
+                      .def = def,
+                      .dt_before = dt_before,
+                      .a = a,
+                      .mass = state->model->rigid_mass[0]};
+  memcpy(f->linear_rate, state->linear_rate, sizeof f->linear_rate);
+  memcpy(f->angular_rate, state->angular_rate, sizeof f->angular_rate);
   start_momentum(f, omega);
   if (!f->sound) return;
   memcpy(f->omega_start, omega, sizeof omega);
-  if (def->integrator == EP_NEWMARK && state->dt_before == 0) start_acceleration(f, omega);
+  if (def->integrator == EP_NEWMARK && dt_before == 0) start_acceleration(f, omega, a);
   const ep_motion motion = {.q = state->q,
                             .v = state->free_p,
-                            .a = state->a,
+                            .a = a,
                             .q_before = state->q_before,
                             .v_before = state->v_before,
                             .dt_before = f->dt_before};
@@ -204,13 +208,13 @@ void ep_free_begin(ep_free_step *f, ep_state *state, const ep_step_def *def) {
   if (def->integrator == EP_BDF2 && f->dt_before > 0) f->turn_inertia = 2 * f->rate / def->dt;
   for (int i = 0; i < 3; i++) {
     velocity[i] = state->linear[i] / f->mass;
-    acceleration[i] = state->linear_rate[i] / f->mass;
+    acceleration[i] = f->linear_rate[i] / f->mass;
     before[i] = state->linear_before[i] / f->mass;
   }
   predict3(f, state->frame.c, velocity, acceleration, state->c_before, before, f->c_base,
            f->c_ahead);
-  carry(f, state->linear, state->linear_rate, state->linear_before, f->linear_ahead);
-  carry(f, state->angular, state->angular_rate, state->angular_before, f->angular_ahead);
+  carry(f, state->linear, f->linear_rate, state->linear_before, f->linear_ahead);
+  carry(f, state->angular, f->angular_rate, state->angular_before, f->angular_ahead);
   memcpy(f->turned, state->frame.R, sizeof f->turned);
 }
 
@@ -477,8 +481,7 @@ static void finish_rigid(ep_free_step *f, const ep_frame *found) {
 void ep_free_finish(ep_free_step *f, const double *x, const ep_frame *found) {
   ep_state *state = f->state;
   const int r = state->model->size.r;
-  state->before_turned = f->def->integrator == EP_BDF2;
-  if (state->before_turned) { // the motion before, in the axes of the step's end
+  if (f->def->integrator == EP_BDF2) { // the motion before, in the axes of the step's end
     memcpy(state->free_q_before, state->q, (size_t)r * sizeof *x);
     fill_mean_coriolis(f, state->free_n);
     memcpy(state->q_before, state->q, (size_t)r * sizeof *x);

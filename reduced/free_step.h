@@ -29,6 +29,9 @@ typedef struct ep_free_step {
   const ep_step_def *def;
   double rate, inertia;  // of the integrator
   double dt_before;      // of the step before; 0: none that counts
+  const double *a;       // (r) acceleration at the start (Newmark)
+  double linear_rate[3]; // of the momenta at the start (Newmark)
+  double angular_rate[3];
   double omega_start[3]; // body axes
   // inertia of the rotation: a torque outside at the end turns the step by J^-1 torque /
   // turn_inertia: half its impulse where psi follows the mean momentum (Newmark, BDF2), all of it
@@ -48,9 +51,11 @@ typedef struct ep_free_step {
   int sound;                           // 0: the rotation was not found; energies are NaN
 } ep_free_step;
 
-// Predictions from the state's motion; fills the unturned base and ahead of q. Before, ep_step made
-// state->dt_before 0 where the motion before does not count.
-void ep_free_begin(ep_free_step *f, ep_state *state, const ep_step_def *def);
+// Predictions from the state's motion; fills the unturned base and ahead of q. dt_before: 0 where
+// the motion before does not count. a (r): the state's acceleration; Newmark without motion before:
+// that of the deformation alone (step.c), completed here.
+void ep_free_begin(ep_free_step *f, ep_state *state, const ep_step_def *def, double dt_before,
+                   double *a);
 
 // Freeze at x: sets state->base, state->aside (turned), and everything above. rotation: NULL in
 // free flight; else R of the iterate (9), contact set.

@@ -6,7 +6,7 @@
 
 #include "reduced/state.h"
 
-enum { LAYOUT = 2 }; // the first number: another list has another
+enum { LAYOUT = 3 }; // the first number: another list has another
 
 typedef struct cursor {
   double *to; // both NULL: count only
@@ -37,7 +37,6 @@ static void pass_motion(cursor *c, ep_state *s) {
   pass(c, s->linear_before, 3);
   pass(c, s->angular_before, 3);
   if (s->model->size.rigid) pass(c, s->free_q_before, (size_t)s->model->size.r);
-  pass_int(c, &s->before_turned);
 }
 
 static void pass_unfold(cursor *c, ep_state *s) {
@@ -60,6 +59,7 @@ static size_t pass_all(ep_state *s, cursor c) {
   pass(&c, s->target, sets * r);
   pass(&c, s->shift, 3 * (size_t)m->size.m);
   pass(&c, &s->dt_before, 1);
+  pass_int(&c, &s->end_integrator);
   pass_int(&c, &s->has_target);
   pass_int(&c, &s->touched);
   pass_unfold(&c, s);

@@ -116,20 +116,20 @@ struct ep_state {
   double force_scale;  // sum_j w_j (lambda + 2 mu) |G_j|: generalised force at unit strain
   double strain_scale; // max_j |G_j|_F: strain by a unit q
   ep_contact contact;
-  double guard_calm; // way from guard_hub on which no guard can reach its limit
-  int guards_soft;   // parabolas in place of walls (reduced/guard.h)
-  int guards_over;   // guards with J < 0 at the beginning of the step
-  ep_unfold unfold;  // the way out of a jam
-  int never_unfolds; // ep_unfold_never
-  int has_target;    // a target was found before
-  double dt_before;  // of the last step; 0: none, or q or v was written since
-  ep_frame frame;    // free motion: reduced/frame.h; at the end of the last step
-  double linear[3];  // momentum, angular momentum about the centre of mass; world axes
+  double guard_calm;  // way from guard_hub on which no guard can reach its limit
+  int guards_soft;    // parabolas in place of walls (reduced/guard.h)
+  int guards_over;    // guards with J < 0 at the beginning of the step
+  ep_unfold unfold;   // the way out of a jam
+  int never_unfolds;  // ep_unfold_never
+  int has_target;     // a target was found before
+  double dt_before;   // of the last step; 0: none, or the frame or motion was set since
+  int end_integrator; // of it
+  ep_frame frame;     // free motion: reduced/frame.h; at the end of the last step
+  double linear[3];   // momentum, angular momentum about the centre of mass; world axes
   double angular[3];
   double linear_rate[3], angular_rate[3]; // of the last step, without contact (Newmark)
   double c_before[3], linear_before[3], angular_before[3]; // at its beginning (BDF2)
-  int before_turned; // q_before, v_before are in the axes of the last step's end (BDF2)
-  int touched;       // something outside acted in it
+  int touched;                                             // something outside acted in it
 #define X(name, count) double *name;
   EP_STATE_ARRAYS(X)
 #undef X

@@ -169,6 +169,7 @@ static void start_acceleration(ep_step_run *s) {
   ep_state *state = s->state;
   const ep_step_def *def = s->def;
   inner_energy(s, state->q, state->g, NULL, 0);
+  s->a = state->direction; // what the state holds stays: the step may fail
   if (s->outer) {
     const int n = state->model->size.r + (s->free ? 6 : 0);
     memset(state->outer_g, 0, (size_t)n * sizeof *state->outer_g);
@@ -178,15 +179,18 @@ static void start_acceleration(ep_step_run *s) {
   const double viscous = damping_stiffness(s);
   if (viscous > 0) add_k0(s, viscous, state->v, NULL, state->g);
   for (int a = 0; a < state->model->size.r; a++)
-    state->a[a] = (def->force ? def->force[a] : 0) - state->g[a] - def->damping_mass * state->v[a];
+    s->a[a] = (def->force ? def->force[a] : 0) - state->g[a] - def->damping_mass * state->v[a];
 }
 
-// Where the caller wrote q or v since the last step there is no motion before; of another q it is
-// not known that it is turned over, or how it would unfold.
-static void notice_writing(ep_state *state) {
+// Where the caller wrote q or v since the last step, or another integrator made it, there is no
+// motion before; of another q it is not known that it is turned over, or how it would unfold.
+static void notice_writing(ep_step_run *s) {
+  ep_state *state = s->state;
   const size_t bytes = (size_t)state->model->size.r * sizeof *state->q;
   const int wrote_q = memcmp(state->q, state->end_q, bytes) != 0;
-  if (wrote_q || memcmp(state->v, state->end_v, bytes) != 0) state->dt_before = 0;
+  const int wrote = wrote_q || memcmp(state->v, state->end_v, bytes) != 0;
+  s->dt_before = wrote || state->end_integrator != (int)s->def->integrator ? 0 : state->dt_before;
+  s->a = state->a;
   if (!wrote_q) return;
   state->guards_soft = 0;
   state->unfold = (ep_unfold){0};
@@ -196,18 +200,18 @@ static void notice_writing(ep_state *state) {
 static void predict(ep_step_run *s) {
   ep_state *state = s->state;
   const size_t r = (size_t)state->model->size.r;
-  if (s->def->integrator == EP_NEWMARK && state->dt_before == 0) start_acceleration(s);
+  if (s->def->integrator == EP_NEWMARK && s->dt_before == 0) start_acceleration(s);
   if (s->free) {
-    ep_free_begin(&s->motion, state, s->def);
+    ep_free_begin(&s->motion, state, s->def, s->dt_before, s->a);
     s->rate = s->motion.rate, s->inertia = s->motion.inertia;
     return;
   }
   const ep_motion motion = {.q = state->q,
                             .v = state->v,
-                            .a = state->a,
+                            .a = s->a,
                             .q_before = state->q_before,
                             .v_before = state->v_before,
-                            .dt_before = state->dt_before};
+                            .dt_before = s->dt_before};
   ep_integrator_predict(s->def->integrator, r, s->def->dt, &motion, state->base, state->aside,
                         &s->rate, &s->inertia);
 }
@@ -299,6 +303,7 @@ static ep_status finish(ep_step_run *s, ep_contact_report *contact) {
     for (int a = 0; a < state->model->size.r; a++) state->a[a] += state->outer_g[a];
   state->touched = touched;
   state->dt_before = s->def->dt;
+  state->end_integrator = (int)s->def->integrator;
   if (s->examples) ep_commit_target(state);
   return EP_OK;
 }
@@ -378,6 +383,7 @@ static int is_loaded(const ep_step_run *s) {
 static int begin_guards(ep_step_run *s) {
   ep_state *state = s->state;
   ep_guard_begin(state);
+  state->unfold.viscosity = 0; // that of another step, where a history was taken since
   if (!state->guards_soft && !state->unfold.on) return 0;
   const int unfolds = state->unfold.on;
   state->unfold.on = 0;
@@ -409,8 +415,9 @@ ep_status ep_step(ep_state *state, const ep_step_def *given, ep_step_report *rep
                       .max_iterations = def->max_iterations};
   ep_status status = find_target(&s, report);
   if (status != EP_OK) return status;
-  notice_writing(state);
   const ep_unfold before = state->unfold;
+  const int soft = state->guards_soft;
+  notice_writing(&s);
   const int calm = begin_guards(&s);
   predict(&s);
   if (s.free && s.motion.sound) ep_free_freeze(&s.motion, state->q, NULL);
@@ -421,6 +428,7 @@ ep_status ep_step(ep_state *state, const ep_step_def *given, ep_step_report *rep
   if (status == EP_OK) status = finish(&s, &report->contact);
   if (status != EP_OK) {
     state->unfold = before;
+    state->guards_soft = soft;
     return status;
   }
   ep_unfold_end(state, calm);

@@ -13,6 +13,8 @@ typedef struct ep_step_run {
   int contact, outer;        // there are obstacles, or an outer potential: something outside acts
   int free;                  // the object is free
   int joint;                 // its rigid motion is among the unknowns
+  double dt_before;          // of the step before; 0: none that counts
+  double *a;                 // (r) acceleration at the start (Newmark)
   double rate, inertia;      // of the integrator
   ep_free_step motion;       // of a free object
   ep_frame iterate;          // joint: where increments are counted from

@@ -26,6 +26,7 @@ struct ep_full {
   ep_factor *factor;
   ep_full_contact *contact; // made by the first step with obstacles
   double dt_before;
+  int end_integrator;  // of the last step
   double force_scale;  // sum_e V (lambda + 2 mu) |gradients|: nodal force at unit strain
   double energy_scale; // sum_e V (lambda + 2 mu): energy at unit strain
   double *block;       // all vectors

@@ -233,7 +233,8 @@ static ep_status predict(ep_full_move *m, ep_error *err) {
   ep_full *full = m->full;
   const size_t n3 = (size_t)full->n3;
   if (memcmp(full->u, full->end_u, n3 * sizeof *full->u) != 0 ||
-      memcmp(full->v, full->end_v, n3 * sizeof *full->v) != 0)
+      memcmp(full->v, full->end_v, n3 * sizeof *full->v) != 0 ||
+      full->end_integrator != (int)m->def->integrator)
     full->dt_before = 0;
   if (m->def->integrator == EP_NEWMARK && full->dt_before == 0) EP_TRY(start_acceleration(m, err));
   const ep_motion motion = {.q = full->u,
@@ -299,6 +300,7 @@ static void finish(ep_full_move *m, int contact_free) {
   memcpy(full->end_u, full->u, bytes);
   memcpy(full->end_v, full->v, bytes);
   full->dt_before = m->def->dt;
+  full->end_integrator = (int)m->def->integrator;
   ep_csr_multiply(&full->mass, 1, full->v, full->pull);
   m->report->kinetic_energy = 0.5 * ep_dot(n3, full->v, full->pull);
   m->report->elastic_energy = m->elastic;

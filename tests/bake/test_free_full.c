@@ -7,6 +7,7 @@
 //    full space within 1 % of its way, its rotation within 1 % of the angle turned; for a soft one
 //    the error is that of the subspace: printed, and falling with r;
 //  - a soft body thrown hard at a floor lands without smaller steps;
+//  - at rest on a floor it stays at rest when another integrator goes on;
 //  - something outside changes the momenta by its impulse, exactly; what does not act changes
 //    nothing, to the last bit; with a spring to the world errors fall as the integrator's order.
 #include "reduced/bake/full_step.h"
@@ -233,6 +234,41 @@ static void hard_landings_need_no_smaller_steps(void **state) {
   }
 }
 
+// Newmark's acceleration is one without contact (ep_contact_share); that of another integrator is
+// not. Taken for it, it would throw the block about by the share of its weight.
+static void rest_is_rest_for_every_integrator(void **state) {
+  (void)state;
+  const ep_frame plane = {{0, -0.13, 0}, {1, 0, 0, 0, 0, 1, 0, -1, 0}};
+  const ep_obstacle floor = {.kind = EP_OBSTACLE_PLANE, .start = plane, .end = plane};
+  const double still[3] = {0};
+  free_body f;
+  ep_contact_tree tree;
+  make_block(EP_STVK_VOLUME, SOFT, 15, 30, &tree, &f);
+  const int r = f.model->size.r;
+  for (int kind = EP_NEWMARK; kind < EP_INTEGRATORS; kind++) {
+    double speed[2];
+    ep_step_def def = ep_default_step();
+    def.damping_stiffness = 0.02;
+    def.tolerance = 1e-9;
+    def.obstacle = &floor;
+    def.obstacles = 1;
+    def.gravity[1] = -9.81;
+    reset(&f, still, still);
+    for (int n = 0; n < 240; n++) assert_int_equal(ep_step(f.state, &def, NULL), EP_OK);
+    for (int i = 0; i < 2; i++) { // of the deformation, before and after
+      speed[i] = 0;
+      for (int a = 0; a < r; a++) speed[i] = hypot(speed[i], ep_state_velocity(f.state)[a]);
+      def.integrator = (ep_integrator)kind;
+      if (i == 0) assert_int_equal(ep_step(f.state, &def, NULL), EP_OK);
+    }
+    print_message("rest, %s: %.1e, then %.1e\n", ep_integrator_name(def.integrator), speed[0],
+                  speed[1]);
+    ASSERT_LESS(speed[1], 1e-6); // Newton's tolerance; its weight moves it by .1 in a step
+  }
+  ep_contact_tree_free(&tree);
+  drop_free_body(&f);
+}
+
 // ---- something outside -------------------------------------------------------------------------
 
 // A spring of stiffness k from one vertex to a point of the world; acts within `reach`.
@@ -394,6 +430,7 @@ int main(void) {
       cmocka_unit_test(a_complete_basis_moves_as_the_full_space),
       cmocka_unit_test(a_bounce_is_that_of_the_full_space),
       cmocka_unit_test(hard_landings_need_no_smaller_steps),
+      cmocka_unit_test(rest_is_rest_for_every_integrator),
       cmocka_unit_test(what_acts_gives_its_impulse),
       cmocka_unit_test(what_does_not_act_changes_nothing),
       cmocka_unit_test(errors_fall_with_the_integrators_order),

@@ -1,7 +1,7 @@
 // What a state carries from step to step. Claim: a state that takes the history of another goes on
 // with the same bits, with every integrator, with examples, while it unfolds and under contact-free
-// loads; q and velocity alone would not do (the claim is not trivial); a list that is too short,
-// foreign or not finite is refused and changes nothing.
+// loads, whatever it did before; q and velocity alone would not do (the claim is not trivial); a
+// list that is too short, foreign or not finite is refused and changes nothing.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -88,6 +88,35 @@ static void the_copy_goes_on_the_same(void **state) {
     }
 }
 
+// Nothing is left of what the state did before: one that unfolds takes the history of a calm one.
+static void nothing_is_left_of_before(void **state) {
+  (void)state;
+  bar *b = bar_create(8, 3, 3, R, 12, 4, 2, EP_STVK_VOLUME);
+  bar_add_guards(b, b->model.size.nt, 0.3);
+  void *block, *other;
+  ep_state *s = bar_state(b, &block), *calm = bar_state(b, &other);
+  ep_step_def def = ep_default_step();
+  ep_step_report report;
+  put(b, FOLDED, s);
+  bar_random_q(b, 0.1, ep_state_q(calm));
+  for (int n = 0; n < 3; n++) assert_int_equal(ep_step(s, &def, &report), EP_OK);
+  assert_int_equal(report.unfolding, 1);
+  assert_int_equal(ep_step(calm, &def, NULL), EP_OK);
+  size_t count;
+  double *list = history_of(calm, &count);
+  assert_int_equal(ep_state_set_history(s, count, list), EP_OK);
+  for (int n = 0; n < 3; n++) {
+    assert_int_equal(ep_step(s, &def, &report), EP_OK);
+    assert_int_equal(ep_step(calm, &def, NULL), EP_OK);
+  }
+  assert_int_equal(report.unfolding, 0);
+  assert_memory_equal(ep_state_q(s), ep_state_q(calm), R * sizeof(double));
+  free(list);
+  free(block);
+  free(other);
+  bar_free(b);
+}
+
 static void other_lists_are_refused(void **state) {
   (void)state;
   bar *b = bar_create(8, 3, 3, R, 12, 4, 2, EP_STVK_VOLUME);
@@ -112,6 +141,7 @@ static void other_lists_are_refused(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(the_copy_goes_on_the_same),
+      cmocka_unit_test(nothing_is_left_of_before),
       cmocka_unit_test(other_lists_are_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
