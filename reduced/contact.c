@@ -258,7 +258,7 @@ double ep_contact_energy(ep_state *state, const ep_step_def *def, const ep_frame
   if (!ep_contact_acts(state, def)) return 0;
   pass p = make_pass(state, def, frame, q, h != NULL);
   p.visit = add_energy;
-  p.scale = ep_contact_share(def);
+  p.scale = state->contact.memory.share;
   p.g = g, p.h = h, p.n = n;
   over_obstacles(&p, def);
   for (int i = 0; h && i < n; i++)
@@ -274,8 +274,9 @@ static void keep(ep_state *state, const ep_frame *frame, const double *q, double
   if (frame) *out = *frame;
 }
 
-void ep_contact_begin(ep_state *state, const ep_step_def *def, const ep_frame *start,
-                      const ep_frame *ahead, const double *q_start, const double *q_ahead) {
+void ep_contact_begin(ep_state *state, const ep_step_def *def, double dt_before,
+                      const ep_frame *start, const ep_frame *ahead, const double *q_start,
+                      const double *q_ahead) {
   ep_contact *c = &state->contact;
   if (!ep_contact_acts(state, def)) return;
   keep(state, start, q_start, state->contact_start, &c->start);
@@ -284,7 +285,7 @@ void ep_contact_begin(ep_state *state, const ep_step_def *def, const ep_frame *s
   const pose from = pose_of(state->model, q_start, start);
   const pose to = pose_of(state->model, q_ahead, ahead);
   c->way = longest_way(state->model, &from, &to);
-  ep_contact_memory_begin(&c->memory);
+  ep_contact_memory_begin(def, dt_before, &c->memory);
 }
 
 static void add_report(pass *p, int vertex, const ep_contact_path *path) {

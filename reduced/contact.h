@@ -17,8 +17,10 @@ int ep_contact_acts(const ep_state *state, const ep_step_def *def);
 
 // The step's beginning (q_start, start) and where free flight would take the object (q_ahead,
 // ahead). Frames: NULL for a held object, whose model space is the world. All are copied.
-void ep_contact_begin(ep_state *state, const ep_step_def *def, const ep_frame *start,
-                      const ep_frame *ahead, const double *q_start, const double *q_ahead);
+// dt_before: of the step before, 0 where none counts.
+void ep_contact_begin(ep_state *state, const ep_step_def *def, double dt_before,
+                      const ep_frame *start, const ep_frame *ahead, const double *q_start,
+                      const double *q_ahead);
 
 // Contact energy of the object at q (r), frame. Gradient added to g (n), Hessian (positive
 // semidefinite approximation) to h (n x n row-major, symmetric before and after) unless NULL.

@@ -34,12 +34,20 @@ ep_contact_law ep_contact_choose(const ep_step_def *def, double unit, double ext
                           .careful = hessian && memory->hessians++ % 2 == 1};
 }
 
-double ep_contact_share(const ep_step_def *def) {
-  return def->integrator == EP_NEWMARK ? 2 : 1;
+double ep_contact_share(const ep_step_def *def, double dt_before) {
+  if (def->integrator == EP_NEWMARK) return 2;
+  if (def->integrator != EP_BDF2 || !(dt_before > 0)) return 1;
+  const double w = def->dt / dt_before;
+  return (1 + 2 * w) / (1 + w);
 }
 
-void ep_contact_memory_begin(ep_contact_memory *m) {
+int ep_contact_split(const ep_step_def *def) {
+  return def->integrator != EP_IMPLICIT_EULER;
+}
+
+void ep_contact_memory_begin(const ep_step_def *def, double dt_before, ep_contact_memory *m) {
   m->passes = m->hessians = 0;
+  m->share = ep_contact_share(def, dt_before);
 }
 
 int ep_contact_retry(double change, double pressing, ep_contact_memory *m) {

@@ -14,6 +14,7 @@ enum { EP_FRICTION_PASSES = 4 }; // a step is solved at most so often again for 
 typedef struct ep_contact_memory {
   int passes;   // solved again for friction
   int hessians; // evaluated
+  double share; // ep_contact_share
 } ep_contact_memory;
 
 // 1 where the contact numbers of a step are finite and in range, its obstacles too.
@@ -25,12 +26,18 @@ int ep_contact_def_valid(const ep_step_def *def);
 ep_contact_law ep_contact_choose(const ep_step_def *def, double unit, double extent, int hessian,
                                  ep_contact_memory *memory);
 
-// Factor of the contact energy in the incremental potential. Newmark's average acceleration takes
-// contact fully implicit (Kane, Repetto, Ortiz and Marsden 1999): half of its force would come from
-// the step before, and feed energy in. In the step's potential that is twice the contact's.
-double ep_contact_share(const ep_step_def *def);
+// Factor of the contact energy in the incremental potential: rate dt (reduced/integrator.h), so
+// that its impulse in the step is all of dt times its force (Kane, Repetto, Ortiz and Marsden
+// 1999). With Newmark half of the force would come from the step before; with BDF2 a third of the
+// impulse would follow in the steps after, whether the object still touches or not. Both feed
+// energy in. So the motion they go on with is free of contact: ep_contact_split. dt_before: 0 where
+// no step before counts.
+double ep_contact_share(const ep_step_def *def, double dt_before);
 
-void ep_contact_memory_begin(ep_contact_memory *memory);
+void ep_contact_memory_begin(const ep_step_def *def, double dt_before, ep_contact_memory *memory);
+
+// Does the integrator go on with a motion that is to be free of contact?
+int ep_contact_split(const ep_step_def *def);
 
 // After a minimum: 1 where the step has to be solved again for friction. change, pressing: of the
 // normal forces friction goes by, and their sum.

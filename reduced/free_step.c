@@ -457,13 +457,18 @@ void ep_free_center(const ep_free_step *f, double c[3]) {
            (f->inertia + drag);
 }
 
-// Frame and momenta; rates of momenta (Newmark) without contact, which is taken anew in every step.
+// Frame and momenta; what the integrator goes on with without contact (ep_contact_share): rates of
+// momenta (Newmark), momenta before (BDF2), which are given its impulse.
 static void finish_rigid(ep_free_step *f, const ep_frame *found) {
   ep_state *state = f->state;
   const double drag = f->def->damping_mass;
   memcpy(state->c_before, state->frame.c, sizeof state->c_before);
   memcpy(state->linear_before, state->linear, sizeof state->linear_before);
   memcpy(state->angular_before, state->angular, sizeof state->angular_before);
+  for (int i = 0; i < 3; i++) {
+    state->linear_before[i] += (f->contact[i] - f->steady[i]) / (f->rate + drag);
+    state->angular_before[i] += (f->contact[3 + i] - f->steady[3 + i]) / (f->rate + drag);
+  }
   end_momentum(f, f->linear_ahead, f->force, f->contact, state->linear);
   end_momentum(f, f->angular_ahead, f->torque, f->contact + 3, state->angular);
   for (int i = 0; i < 3; i++) {

@@ -43,7 +43,7 @@ typedef struct ep_free_step {
   double angular_ahead[3];      //
   double force[3], torque[3];   // of gravity and pulls at the end of the step
   double contact[6];            // force and torque (about c) of what is outside, in the same way
-  double steady[6];             // of it, what is a force like others to Newmark's formula
+  double steady[6];             // of it, what is a force like others to the integrator
   // frozen:
   double turned[9];                    // R at the end, free of contact; with contact: the iterate
   double zeta[3];                      // rotation from the contact-free R to it, body axes

@@ -201,8 +201,8 @@ void ep_joint_begin(ep_step_run *s) {
   }
 }
 
-// An outer potential is a force like others to Newmark's formula; contact is not
-// (ep_contact_share): it is taken off the acceleration that is kept.
+// An outer potential is a force like others to the integrator; contact is not (ep_contact_share).
+// Leaves the gradient of contact alone in outer_g where the integrator has to know it.
 int ep_joint_finish(ep_step_run *s) {
   ep_state *state = s->state;
   const int r = state->model->size.r, n = r + 6;
@@ -215,7 +215,8 @@ int ep_joint_finish(ep_step_run *s) {
   ep_outside_energy(s, &s->iterate, state->x, state->outer_g, NULL);
   for (int i = 0; i < 6; i++) s->motion.contact[i] = -state->outer_g[r + i];
   const int acted = ep_dot(n, state->outer_g, state->outer_g) != 0;
+  if (!s->outer || !s->contact || !ep_contact_split(s->def)) return acted;
   memset(state->outer_g, 0, bytes);
-  if (s->contact) ep_contact_energy(state, s->def, &s->iterate, state->x, state->outer_g, NULL, n);
+  ep_contact_energy(state, s->def, &s->iterate, state->x, state->outer_g, NULL, n);
   return acted;
 }

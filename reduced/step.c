@@ -221,8 +221,8 @@ static void begin_contact(ep_step_run *s) {
   ep_state *state = s->state;
   ep_frame ahead;
   if (s->free) ep_joint_flight(s, &ahead);
-  ep_contact_begin(state, s->def, s->free ? &state->frame : NULL, s->free ? &ahead : NULL, state->q,
-                   state->aside);
+  ep_contact_begin(state, s->def, s->dt_before, s->free ? &state->frame : NULL,
+                   s->free ? &ahead : NULL, state->q, state->aside);
 }
 
 // Start at the free flight or at rest, whichever has the lower potential.
@@ -263,13 +263,24 @@ static ep_status minimise(ep_step_run *s, ep_newton *newton) {
   return minimise_contact(s, newton);
 }
 
-// The acceleration Newmark's formula goes on with is free of contact (ep_contact_share); outer_g
-// receives what is to be added to it.
+// Gradient of contact alone at the end of the step of a held object, into outer_g.
 static void contact_gradient(ep_step_run *s) {
   ep_state *state = s->state;
   const int r = state->model->size.r;
   memset(state->outer_g, 0, (size_t)r * sizeof *state->outer_g);
   ep_contact_energy(state, s->def, NULL, state->x, state->outer_g, NULL, r);
+}
+
+// The motion the integrator goes on with is made free of contact, whose gradient is in outer_g: the
+// acceleration of Newmark's formula; the velocity before of BDF2, as if it had had the impulse.
+static void split_contact(ep_step_run *s) {
+  ep_state *state = s->state;
+  const double time = 1 / (s->rate + s->def->damping_mass);
+  for (int a = 0; a < state->model->size.r; a++)
+    if (s->def->integrator == EP_NEWMARK)
+      state->a[a] += state->outer_g[a];
+    else
+      state->v_before[a] -= time * state->outer_g[a];
 }
 
 static void finish_held(ep_step_run *s) {
@@ -286,11 +297,11 @@ static void finish_held(ep_step_run *s) {
 static ep_status finish(ep_step_run *s, ep_contact_report *contact) {
   ep_state *state = s->state;
   const ep_frame *frame = s->free ? (s->joint ? &s->iterate : &state->frame) : NULL;
-  const int newmark = s->def->integrator == EP_NEWMARK;
+  const int split = ep_contact_split(s->def) && s->contact && (!s->free || s->joint);
   int touched = 0;
   if (s->joint)
     touched = ep_joint_finish(s);
-  else if (s->contact && !s->free && newmark)
+  else if (split)
     contact_gradient(s);
   if (s->joint && !ep_free_settle(&s->motion, state->x)) return EP_ERR_NUMERIC;
   if (s->contact && (!s->free || s->joint))
@@ -299,8 +310,7 @@ static ep_status finish(ep_step_run *s, ep_contact_report *contact) {
     ep_free_finish(&s->motion, state->x, s->joint ? &s->iterate : NULL);
   else
     finish_held(s);
-  if (newmark && s->contact && (!s->free || s->joint))
-    for (int a = 0; a < state->model->size.r; a++) state->a[a] += state->outer_g[a];
+  if (split) split_contact(s);
   state->touched = touched;
   state->dt_before = s->def->dt;
   state->end_integrator = (int)s->def->integrator;

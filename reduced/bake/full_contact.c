@@ -43,12 +43,13 @@ void ep_full_contact_free(ep_full_contact *contact) {
   free(contact);
 }
 
-void ep_full_contact_begin(ep_full_contact *c, const double *start, const double *ahead) {
+void ep_full_contact_begin(ep_full_contact *c, const ep_step_def *def, double dt_before,
+                           const double *start, const double *ahead) {
   const size_t bytes = 3 * (size_t)c->mesh->nv * sizeof(double);
   memcpy(c->start, start, bytes);
   memcpy(c->lag, start, bytes);
   memcpy(c->ahead, ahead, bytes);
-  ep_contact_memory_begin(&c->memory);
+  ep_contact_memory_begin(def, dt_before, &c->memory);
 }
 
 typedef struct positions {
@@ -79,7 +80,7 @@ static ep_contact_law law_of(ep_full_contact *c, const ep_step_def *def, bool he
 double ep_full_contact_energy(ep_full_contact *c, const ep_step_def *def, const double *u,
                               double *g, ep_csr *k) {
   const ep_contact_law law = law_of(c, def, k != NULL);
-  const double share = ep_contact_share(def);
+  const double share = c->memory.share;
   double sum = 0;
   positions at;
   for (int o = 0; o < def->obstacles; o++)

@@ -1,5 +1,5 @@
-// Contact of the full-space reference: the law of reduced/contact_point.h on every surface vertex that
-// is not held, by a plain loop. Private to the full-space step.
+// Contact of the full-space reference: the law of reduced/contact_point.h on every surface vertex
+// that is not held, by a plain loop. Private to the full-space step.
 #ifndef EP_BAKE_FULL_CONTACT_H
 #define EP_BAKE_FULL_CONTACT_H
 
@@ -20,7 +20,8 @@ typedef struct ep_full_contact {
 ep_status ep_full_contact_create(const ep_fem *fem, ep_full_contact **out, ep_error *err);
 void ep_full_contact_free(ep_full_contact *contact);
 // As the functions of reduced/contact.h, for displacements (3n).
-void ep_full_contact_begin(ep_full_contact *contact, const double *start, const double *ahead);
+void ep_full_contact_begin(ep_full_contact *contact, const ep_step_def *def, double dt_before,
+                           const double *start, const double *ahead);
 // Gradient added to g (3n), Hessian to k (3 x 3 blocks on the diagonal) unless NULL.
 double ep_full_contact_energy(ep_full_contact *contact, const ep_step_def *def, const double *u,
                               double *g, ep_csr *k);

@@ -245,7 +245,8 @@ static ep_status predict(ep_full_move *m, ep_error *err) {
                             .dt_before = full->dt_before};
   ep_integrator_predict(m->def->integrator, n3, m->def->dt, &motion, full->base, full->ahead,
                         &m->rate, &m->inertia);
-  if (ep_full_touches(m)) ep_full_contact_begin(full->contact, full->u, full->ahead);
+  if (ep_full_touches(m))
+    ep_full_contact_begin(full->contact, m->def, full->dt_before, full->u, full->ahead);
   const double still = ep_full_evaluate(m, full->u, NULL),
                flight = ep_full_evaluate(m, full->ahead, NULL);
   memcpy(full->x, flight < still ? full->ahead : full->u, n3 * sizeof *full->x);
@@ -274,8 +275,8 @@ static ep_status minimise_all(ep_full_move *m, ep_error *err) {
   }
 }
 
-// Acceleration by contact into `trial`: what Newmark's formula goes on with is free of it
-// (ep_contact_share).
+// Acceleration by contact, the other way round, into `trial`: what the integrator goes on with is
+// free of it (ep_contact_share).
 static ep_status contact_acceleration(ep_full_move *m, ep_error *err) {
   ep_full *full = m->full;
   memset(full->g, 0, (size_t)full->n3 * sizeof *full->g);
@@ -295,7 +296,11 @@ static void finish(ep_full_move *m, int contact_free) {
     full->a[i] = m->inertia * (full->x[i] - full->ahead[i]);
     full->v[i] = m->rate * (full->x[i] - full->base[i]);
   }
-  if (contact_free) ep_axpy(n3, 1, full->trial, full->a);
+  const double time = 1 / (m->rate + m->def->damping_mass);
+  if (contact_free && m->def->integrator == EP_NEWMARK)
+    ep_axpy(n3, 1, full->trial, full->a);
+  else if (contact_free)
+    ep_axpy(n3, -time, full->trial, full->v_before);
   memcpy(full->u, full->x, bytes);
   memcpy(full->end_u, full->u, bytes);
   memcpy(full->end_v, full->v, bytes);
@@ -323,7 +328,7 @@ ep_status ep_full_step(ep_full *full, const ep_step_def *def, ep_full_report *re
     EP_TRY(ep_full_contact_create(full->fem, &full->contact, err));
   EP_TRY(predict(&m, err));
   EP_TRY(minimise_all(&m, err));
-  const int contact_free = ep_full_touches(&m) && def->integrator == EP_NEWMARK;
+  const int contact_free = ep_full_touches(&m) && ep_contact_split(def);
   if (contact_free) EP_TRY(contact_acceleration(&m, err));
   if (ep_full_touches(&m)) ep_full_contact_measure(full->contact, def, full->x, &report->contact);
   finish(&m, contact_free);

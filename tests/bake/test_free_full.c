@@ -7,6 +7,8 @@
 //    full space within 1 % of its way, its rotation within 1 % of the angle turned; for a soft one
 //    the error is that of the subspace: printed, and falling with r;
 //  - a soft body thrown hard at a floor lands without smaller steps;
+//  - impacts far shorter than a step add no energy, wherever in the step they come, and change the
+//    momentum by dt times the force of every step, with every integrator;
 //  - at rest on a floor it stays at rest when another integrator goes on;
 //  - something outside changes the momenta by its impulse, exactly; what does not act changes
 //    nothing, to the last bit; with a spring to the world errors fall as the integrator's order.
@@ -234,6 +236,61 @@ static void hard_landings_need_no_smaller_steps(void **state) {
   }
 }
 
+// A rigid block meets a floor at 20 m/s, `share` of a step after a step's start; dt changes from
+// step to step. Returns the energy left over that before; impulse: how far the momentum is from
+// what the forces reported gave it, over what it was.
+static double land(free_body *f, ep_integrator kind, double share, double *impulse) {
+  const double velocity[3] = {0, -20, 0}, spin[3] = {0, 0, 0.5};
+  ep_step_def def = ep_default_step();
+  const double base = f->model->rigid_origin[1] - 0.125 - 20 * def.dt * (3 + share);
+  const ep_frame plane = {{0, base, 0}, {1, 0, 0, 0, 0, 1, 0, -1, 0}};
+  const ep_obstacle floor = {
+      .kind = EP_OBSTACLE_PLANE, .friction = 0.3, .start = plane, .end = plane};
+  double p[3], p0[3], l[3], given = 0, before = 0, after = 0;
+  def.integrator = kind;
+  def.damping_stiffness = 5e-3;
+  def.obstacle = &floor;
+  def.obstacles = 1;
+  reset(f, velocity, spin);
+  ep_state_momentum(f->state, p0, l);
+  int touched = 0;
+  for (int n = 0; n < 40; n++) {
+    ep_step_report report;
+    def.dt = (n > 3 && n % 3 == 2 ? 0.5 : 1) / 60.0;
+    assert_int_equal(ep_step(f->state, &def, &report), EP_OK);
+    after = report.elastic_energy + report.kinetic_energy + report.contact.energy;
+    if (n == 0) before = after;
+    given += def.dt * report.contact.force[1];
+    touched += report.contact.touching;
+  }
+  assert_true(touched > 0);
+  ep_state_momentum(f->state, p, l);
+  *impulse = fabs(p[1] - p0[1] - given) / fabs(p0[1]);
+  return after / before;
+}
+
+static void impacts_add_no_energy(void **state) {
+  (void)state;
+  enum { SHARES = 4 };
+  free_body f;
+  ep_contact_tree tree;
+  make_block(EP_STVK_VOLUME, STIFF, 15, 30, &tree, &f);
+  for (int kind = 0; kind < EP_INTEGRATORS; kind++) {
+    double most = 0, worst = 0;
+    for (int i = 0; i < SHARES; i++) {
+      double impulse;
+      most = fmax(most, land(&f, (ep_integrator)kind, (double)i / SHARES, &impulse));
+      worst = fmax(worst, impulse);
+    }
+    print_message("impacts, %s: at most %.3f of the energy left, impulses to %.1e\n",
+                  ep_integrator_name((ep_integrator)kind), most, worst);
+    ASSERT_LESS(most, 1);
+    ASSERT_LESS(worst, 1e-12); // round-off
+  }
+  ep_contact_tree_free(&tree);
+  drop_free_body(&f);
+}
+
 // Newmark's acceleration is one without contact (ep_contact_share); that of another integrator is
 // not. Taken for it, it would throw the block about by the share of its weight.
 static void rest_is_rest_for_every_integrator(void **state) {
@@ -430,6 +487,7 @@ int main(void) {
       cmocka_unit_test(a_complete_basis_moves_as_the_full_space),
       cmocka_unit_test(a_bounce_is_that_of_the_full_space),
       cmocka_unit_test(hard_landings_need_no_smaller_steps),
+      cmocka_unit_test(impacts_add_no_energy),
       cmocka_unit_test(rest_is_rest_for_every_integrator),
       cmocka_unit_test(what_acts_gives_its_impulse),
       cmocka_unit_test(what_does_not_act_changes_nothing),

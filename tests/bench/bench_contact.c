@@ -187,8 +187,8 @@ static double fastest(bench *x, void (*run)(bench *)) {
 
 static void measure(bench *x, const char *patch, int vertices, double first[3]) {
   ep_contact_report report;
-  ep_contact_begin(x->state, &x->def, NULL, NULL, x->q, x->q);
-  ep_contact_begin(x->plain_state, &x->def, NULL, NULL, x->q, x->q);
+  ep_contact_begin(x->state, &x->def, 0, NULL, NULL, x->q, x->q);
+  ep_contact_begin(x->plain_state, &x->def, 0, NULL, NULL, x->q, x->q);
   ep_contact_measure(x->state, &x->def, NULL, x->q, &report);
   const double now[3] = {fastest(x, with_tree), fastest(x, energy_alone), fastest(x, step)};
   const double all = fastest(x, without_tree);

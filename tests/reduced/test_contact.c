@@ -102,7 +102,7 @@ static void destroy(world *w) {
 
 static void begin(world *w, int framed) {
   const ep_frame *start = framed ? &w->start : NULL, *now = framed ? &w->frame : NULL;
-  ep_contact_begin(w->state, &w->def, start, now, w->q_start, w->q);
+  ep_contact_begin(w->state, &w->def, 0, start, now, w->q_start, w->q);
   // Friction by a configuration in between.
   ep_state *s = w->state;
   for (int i = 0; i < R; i++) s->contact_lag[i] = 0.97 * w->q[i];
@@ -233,8 +233,8 @@ static void tree_finds_what_a_loop_finds(void **unused) {
       w.def.contact.thickness = 0.004;
       bar_random_q(w.b, 0.01 * trial, w.q);
       bar_random_q(w.b, 0.2, w.q_start);
-      ep_contact_begin(w.state, &w.def, NULL, NULL, w.q_start, w.q);
-      ep_contact_begin(loop, &w.def, NULL, NULL, w.q_start, w.q);
+      ep_contact_begin(w.state, &w.def, 0, NULL, NULL, w.q_start, w.q);
+      ep_contact_begin(loop, &w.def, 0, NULL, NULL, w.q_start, w.q);
       double g[2][R] = {{0}}, size = 0, apart = 0;
       ep_contact_report report;
       const double e = ep_contact_energy(w.state, &w.def, NULL, w.q, g[0], NULL, R);
