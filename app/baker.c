@@ -22,19 +22,26 @@ static ep_status copy_model(const char *from, const char *to, ep_error *err) {
   return status;
 }
 
+static ep_status spares(void *user, const char *path, ep_error *err) {
+  return ep_output_spares(user, path, err);
+}
+
 static ep_status command_bake(const ep_cli *cli, ep_session *session, ep_bake *bake,
                               ep_error *err) {
   char path[EP_PATH_MAX];
-  if (cli->out) EP_TRY(ep_output_place(cli->out, err));
+  if (cli->out) {
+    EP_TRY(ep_output_place(cli->out, err));
+    EP_TRY(ep_scene_each_file(&session->scene, spares, (void *)cli->out, err));
+  }
   EP_TRY(ep_bake_model(bake, path, err));
   if (cli->out) EP_TRY(copy_model(path, cli->out, err));
   EP_TRY(ep_bake_poses(bake, err)); // for the report: a model in the cache does not ask for them
   if (session->shapes.sets) EP_TRY(ep_bake_cubature(bake, err)); // the same
   if (cli->json) {
     json_t *report =
-        json_pack("{s:s, s:s, s:i, s:o, s:o}", "scene", session->scene.name, "model",
-                  cli->out ? cli->out : path, "warnings", session->log.warnings, "stages",
-                  ep_report_stages(&session->plan), "examples", ep_poses_json(bake));
+        json_pack("{s:s, s:o, s:i, s:o, s:o}", "scene", session->scene.name, "model",
+                  ep_json_text(cli->out ? cli->out : path), "warnings", session->log.warnings,
+                  "stages", ep_report_stages(&session->plan), "examples", ep_poses_json(bake));
     if (report && session->shapes.sets)
       json_object_set_new(report, "regions", ep_regions_json(bake));
     return ep_report_print(report, err);

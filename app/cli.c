@@ -293,8 +293,8 @@ void ep_cli_parse(int argc, char **argv, ep_cli *out) {
 int ep_cli_fail(const ep_cli *cli, const ep_error *err) {
   if (!cli->served) fprintf(stderr, "eigenpose: %s\n", err->text);
   if (cli->json) {
-    json_t *root = json_pack("{s:{s:s, s:s}}", "error", "status", ep_status_name(err->status),
-                             "message", err->text);
+    json_t *root = json_pack("{s:{s:s, s:o}}", "error", "status", ep_status_name(err->status),
+                             "message", ep_json_text(err->text));
     ep_error ignored = {0};
     if (root) ep_report_print(root, &ignored);
   }

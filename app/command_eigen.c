@@ -122,7 +122,7 @@ static ep_status leave_files(const char *out, const ep_mesh *mesh, const ep_lb *
 
 static ep_status print(const ep_cli *cli, const ep_mesh *mesh, const ep_lb *lb, ep_error *err) {
   if (cli->json)
-    return ep_report_print(json_pack("{s:s, s:i, s:i, s:f, s:o}", "mesh", mesh->name, "vertices",
+    return ep_report_print(json_pack("{s:o, s:i, s:i, s:f, s:o}", "mesh", ep_json_text(mesh->name), "vertices",
                                      mesh->nv, "tets", mesh->nt, "volume", lb->volume,
                                      "eigenvalues", ep_json_numbers(lb->m, lb->lambda)),
                            err);
@@ -136,7 +136,10 @@ ep_status ep_command_eigen(const ep_cli *cli, ep_error *err) {
   ep_mesh mesh = {0};
   ep_mesh_findings findings;
   ep_lb lb = {0};
-  if (cli->out) EP_TRY(ep_output_place(cli->out, err));
+  if (cli->out) {
+    EP_TRY(ep_output_place(cli->out, err));
+    EP_TRY(ep_output_spares(cli->out, cli->input, err));
+  }
   EP_TRY(ep_mesh_read(cli->input, &mesh, &findings, &log, err));
   ep_status status = ep_mesh_require_sound(&mesh, &findings, false, err);
   if (status == EP_OK) {

@@ -1,9 +1,11 @@
 #include "app/process.h"
 
 #include <errno.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -38,8 +40,10 @@ ep_status ep_baker_become(char **argv, ep_error *err) {
   return ep_fail(err, EP_ERR_IO, "cannot run %s: %s", path, strerror(errno));
 }
 
-static _Noreturn void child(const char *path, const ep_cli *cli, int output) {
+static _Noreturn void child(const char *path, const ep_cli *cli, int output, pid_t parent) {
   const char *argv[2 * EP_SETS_MAX + 16];
+  // Nobody waits for a bake whose run was killed.
+  if (prctl(PR_SET_PDEATHSIG, SIGTERM) != 0 || getppid() != parent) _exit(EP_ERR_IO);
   int n = 0;
   argv[n++] = path;
   argv[n++] = "bake";
@@ -82,7 +86,7 @@ ep_status ep_baker_run(const ep_cli *cli, json_t **report, ep_error *err) {
   EP_TRY(find_baker(path, err));
   fflush(NULL);
   if (pipe(ends) != 0) return ep_fail(err, EP_ERR_IO, "no pipe: %s", strerror(errno));
-  const pid_t pid = fork();
+  const pid_t self = getpid(), pid = fork();
   if (pid < 0) {
     close(ends[0]);
     close(ends[1]);
@@ -90,7 +94,7 @@ ep_status ep_baker_run(const ep_cli *cli, json_t **report, ep_error *err) {
   }
   if (pid == 0) {
     close(ends[0]);
-    child(path, cli, ends[1]);
+    child(path, cli, ends[1], self);
   }
   close(ends[1]);
   json_error_t trouble;

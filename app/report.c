@@ -6,8 +6,18 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/escape.h"
+
 json_t *ep_json_number(double value) {
   return isfinite(value) ? json_real(value) : json_null();
+}
+
+json_t *ep_json_text(const char *text) {
+  if (ep_text_is_utf8(text)) return json_string(text);
+  char *readable = ep_text_to_utf8(text);
+  json_t *out = readable ? json_string(readable) : NULL;
+  free(readable);
+  return out;
 }
 
 json_t *ep_json_numbers(int count, const double *value) {
@@ -30,8 +40,8 @@ json_t *ep_report_stages(const ep_plan *plan) {
   for (int i = 0; list && i < plan->count; i++) {
     const ep_stage *stage = &plan->stage[i];
     if (!baked(stage)) continue;
-    json_array_append_new(list, json_pack("{s:s, s:f, s:b}", "name", stage->name, "seconds",
-                                          stage->seconds, "cached", (int)stage->cached));
+    json_array_append_new(list, json_pack("{s:o, s:f, s:b}", "name", ep_json_text(stage->name),
+                                          "seconds", stage->seconds, "cached", (int)stage->cached));
   }
   return list;
 }
@@ -57,8 +67,8 @@ json_t *ep_report_plan(const ep_scene *scene, const ep_shapes *shapes, const ep_
   json_t *list = json_array();
   for (int i = 0; list && i < plan->count; i++) {
     const ep_stage *stage = &plan->stage[i];
-    json_t *entry = json_pack("{s:s, s:b, s:s}", "name", stage->name, "runs", (int)stage->runs,
-                              "reason", stage->reason);
+    json_t *entry = json_pack("{s:o, s:b, s:o}", "name", ep_json_text(stage->name), "runs",
+                              (int)stage->runs, "reason", ep_json_text(stage->reason));
     if (entry && baked(stage)) {
       json_object_set_new(entry, "key", json_string(stage->key.hex));
       json_object_set_new(entry, "cached", json_boolean(in_cache[i]));

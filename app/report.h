@@ -10,6 +10,8 @@
 
 // Numbers JSON cannot hold (NaN, infinity) become null.
 json_t *ep_json_number(double value);
+// A string; bytes that are no UTF-8, as names of files may have, become U+FFFD.
+json_t *ep_json_text(const char *text);
 json_t *ep_json_numbers(int count, const double *value);
 // The number at a key, NaN where there is none (or null).
 double ep_json_get_number(const json_t *object, const char *key);

@@ -37,8 +37,11 @@ ep_status ep_file_read(const char *path, char **text, size_t *size, ep_error *er
   *text = NULL;
   *size = 0;
   struct stat info;
-  if (stat(path, &info) == 0 && S_ISDIR(info.st_mode))
+  const bool there = stat(path, &info) == 0;
+  if (there && S_ISDIR(info.st_mode))
     return ep_fail(err, EP_ERR_IO, "%s is a folder; name a file in it", path);
+  if (there && (S_ISCHR(info.st_mode) || S_ISBLK(info.st_mode))) // may never end
+    return ep_fail(err, EP_ERR_IO, "%s is a device; name a file", path);
   FILE *file = fopen(path, "rb");
   if (!file) return io_error(err, "cannot open", path);
   const ep_status status = read_stream(file, path, text, size, err);
@@ -46,9 +49,22 @@ ep_status ep_file_read(const char *path, char **text, size_t *size, ep_error *er
   return status;
 }
 
+// A rename would put a file in the place of a folder or of /dev/null.
+static ep_status require_file(const char *path, ep_error *err) {
+  struct stat info;
+  if (stat(path, &info) != 0 || S_ISREG(info.st_mode)) return EP_OK;
+  if (S_ISDIR(info.st_mode))
+    return ep_fail(err, EP_ERR_IO,
+                   "cannot write the file %s: a folder of that name is there; take it away or name "
+                   "another file",
+                   path);
+  return ep_fail(err, EP_ERR_IO, "cannot write %s: it is a device, no file; name a file", path);
+}
+
 ep_status ep_output_open(ep_output *out, const char *path, ep_error *err) {
   memset(out, 0, sizeof *out);
   if (strlen(path) >= sizeof out->path) return ep_fail(err, EP_ERR_IO, "path too long: %s", path);
+  EP_TRY(require_file(path, err));
   strcpy(out->path, path);
   snprintf(out->temporary, sizeof out->temporary, "%s.%ld.tmp", path, (long)getpid());
   out->file = fopen(out->temporary, "wb");
@@ -118,11 +134,24 @@ ep_status ep_output_place(const char *path, ep_error *err) {
   EP_TRY(ep_path_folder(path, folder, err));
   if (stat(path, &info) == 0 && S_ISDIR(info.st_mode))
     return ep_fail(err, EP_ERR_IO, "%s is a folder; name a file in it", path);
+  EP_TRY(require_file(path, err));
   if (stat(folder, &info) != 0) return io_error(err, "cannot write into folder", folder);
   if (!S_ISDIR(info.st_mode))
     return ep_fail(err, EP_ERR_IO, "cannot write %s: %s is no folder", path, folder);
   return access(folder, W_OK | X_OK) == 0 ? EP_OK
                                           : io_error(err, "cannot write into folder", folder);
+}
+
+bool ep_path_same(const char *a, const char *b) {
+  struct stat one, two;
+  return stat(a, &one) == 0 && stat(b, &two) == 0 && one.st_dev == two.st_dev &&
+         one.st_ino == two.st_ino;
+}
+
+ep_status ep_output_spares(const char *path, const char *input, ep_error *err) {
+  if (!ep_path_same(path, input)) return EP_OK;
+  return ep_fail(err, EP_ERR_IO, "%s is what is read here and would be written over; name another",
+                 path);
 }
 
 ep_status ep_file_remove(const char *path, ep_error *err) {

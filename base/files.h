@@ -34,9 +34,11 @@ ep_status ep_file_write(const char *path, const void *bytes, size_t size, ep_err
 ep_status ep_make_folders(const char *path, ep_error *err);
 // The same for a folder of results, which must take files: known before long work, not behind it.
 ep_status ep_output_folder(const char *path, ep_error *err);
-// For one file of results: its folder must be there and take files, and the path be no folder; made
-// is nothing.
+// For one file of results: its folder must be there and take files, and the path be no folder and no
+// device; made is nothing.
 ep_status ep_output_place(const char *path, ep_error *err);
+// Refused where both paths lead to one file: a result never replaces what it was made from.
+ep_status ep_output_spares(const char *path, const char *input, ep_error *err);
 // Remove a file if it is there.
 ep_status ep_file_remove(const char *path, ep_error *err);
 
@@ -49,6 +51,7 @@ ep_status ep_path_stem(const char *path, char *out, ep_error *err);
 // The extension without its dot, "" where there is none.
 const char *ep_path_extension(const char *path);
 bool ep_path_exists(const char *path);
+bool ep_path_same(const char *a, const char *b); // two names of one file or folder
 
 // 128-bit content hash (XXH3) as 32 hexadecimal digits and a NUL: names of cached results.
 typedef struct ep_digest {

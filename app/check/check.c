@@ -58,13 +58,13 @@ static void print_text(const ep_check *check, bool quiet) {
 // ---- JSON --------------------------------------------------------------------------------------
 
 static json_t *mesh_json(const ep_checked_mesh *m) {
-  if (!m->read) return json_pack("{s:s, s:b}", "file", m->file, "read", 0);
+  if (!m->read) return json_pack("{s:o, s:b}", "file", ep_json_text(m->file), "read", 0);
   const ep_mesh_findings *f = &m->findings;
   const ep_mesh_quality *q = &m->quality;
   return json_pack(
-      "{s:s, s:b, s:i, s:i, s:i, s:o, s:o, s:i, s:i, s:i, s:i, s:i,"
+      "{s:o, s:b, s:i, s:i, s:i, s:o, s:o, s:i, s:i, s:i, s:i, s:i,"
       " s:{s:o, s:o, s:o, s:o, s:i}, s:{s:i, s:i, s:i}}",
-      "file", m->file, "read", 1, "vertices", m->mesh.nv, "tets", m->mesh.nt, "parts",
+      "file", ep_json_text(m->file), "read", 1, "vertices", m->mesh.nv, "tets", m->mesh.nt, "parts",
       f->components, "volume", ep_json_number(ep_mesh_volume(&m->mesh)), "diagonal",
       ep_json_number(ep_mesh_diagonal(&m->mesh)), "inverted_tets", f->repaired_orientation,
       "degenerate_tets", f->degenerate_tets, "repeated_tets", f->repeated_tets, "unused_vertices",
@@ -81,15 +81,15 @@ static ep_status print_json(const ep_check *check, const char *repaired, ep_erro
     json_array_append_new(meshes, mesh_json(&check->mesh[i]));
   for (int i = 0; i < check->nfound; i++) {
     const ep_found *f = &check->found[i];
-    json_array_append_new(found,
-                          json_pack("{s:s, s:s, s:s, s:s, s:b}", "severity",
-                                    severity_name(f->severity), "code", f->code, "file", f->file,
-                                    "message", f->text, "repairable", f->repairable));
+    json_array_append_new(found, json_pack("{s:s, s:s, s:o, s:o, s:b}", "severity",
+                                           severity_name(f->severity), "code", f->code, "file",
+                                           ep_json_text(f->file), "message", ep_json_text(f->text),
+                                           "repairable", f->repairable));
   }
-  return ep_report_print(json_pack("{s:o, s:o, s:i, s:i, s:s?}", "meshes", meshes, "findings",
-                                   found, "errors", ep_check_count(check, EP_FOUND_ERROR),
-                                   "warnings", ep_check_count(check, EP_FOUND_WARNING), "repaired",
-                                   repaired),
+  return ep_report_print(json_pack("{s:o, s:o, s:i, s:i, s:o}", "meshes", meshes, "findings", found,
+                                   "errors", ep_check_count(check, EP_FOUND_ERROR), "warnings",
+                                   ep_check_count(check, EP_FOUND_WARNING), "repaired",
+                                   repaired ? ep_json_text(repaired) : json_null()),
                          err);
 }
 
@@ -145,6 +145,7 @@ static ep_status check_usage(const ep_cli *cli, ep_error *err) {
   if (cli->ninputs != 1 || is_scene(cli->inputs[0]))
     return ep_fail(err, EP_ERR_ARGUMENT, "--repair takes one mesh, not %s",
                    cli->ninputs != 1 ? "several files" : "a scene");
+  EP_TRY(ep_output_spares(cli->repair, cli->inputs[0], err));
   const char *extension = ep_path_extension(cli->repair);
   if (strcasecmp(extension, "veg") == 0 || strcasecmp(extension, "vtu") == 0) return EP_OK;
   return ep_fail(err, EP_ERR_ARGUMENT, "--repair %s: the repaired mesh is written as .veg or .vtu",

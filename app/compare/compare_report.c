@@ -150,7 +150,7 @@ static json_t *point_json(const ep_point *p, int frames) {
                         (int)p->cached, "failed", (int)p->failed);
   if (!o) return NULL;
   if (p->failed) {
-    json_object_set_new(o, "why", json_string(p->why));
+    json_object_set_new(o, "why", ep_json_text(p->why));
     return o;
   }
 #define X(name, text) json_object_set_new(o, #name, ep_json_number(p->name));

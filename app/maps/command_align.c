@@ -45,9 +45,9 @@ static json_t *map_json(const ep_bake *bake, const ep_stage *stage, const ep_map
   const ep_shape_file *to = &bake->shapes->shape[stage->to];
   json_t *record = ep_quality_json(&map->quality, &from->mesh, &to->mesh);
   if (!record) return NULL;
-  json_object_set_new(record, "name", json_string(stage->name));
-  json_object_set_new(record, "from", json_string(from->name));
-  json_object_set_new(record, "to", json_string(to->name));
+  json_object_set_new(record, "name", ep_json_text(stage->name));
+  json_object_set_new(record, "from", ep_json_text(from->name));
+  json_object_set_new(record, "to", ep_json_text(to->name));
   json_object_set_new(record, "m", json_integer(map->m));
   json_object_set_new(record, "cached", json_boolean(stage->cached));
   json_object_set_new(record, "accepted", json_boolean(bake->scene->family[stage->family].accept));

@@ -40,7 +40,7 @@ static json_t *landmarks_json(const ep_map_quality *q) {
 static json_t *frame_json(const ep_frame_candidate *c) {
   json_t *object = json_object();
   if (!object) return NULL;
-  json_object_set_new(object, "name", json_string(c->name));
+  json_object_set_new(object, "name", ep_json_text(c->name));
   json_object_set_new(object, "reflected", json_boolean(c->reflected));
   json_object_set_new(object, "start_angle", ep_json_number(c->start_angle));
   json_object_set_new(object, "score", ep_json_number(c->score));
@@ -117,7 +117,7 @@ json_t *ep_quality_json(const ep_map_quality *q, const ep_mesh *from, const ep_m
     return NULL;
   }
   json_object_set_new(object, "verdict", json_string(ep_verdict_name(q->verdict)));
-  json_object_set_new(object, "reasons", json_string(q->reasons));
+  json_object_set_new(object, "reasons", ep_json_text(q->reasons));
   set_numbers(object, q);
   for (int i = 0; q->region && i < q->regions; i++)
     json_array_append_new(regions, region_json(i, &q->region[i]));
@@ -234,7 +234,7 @@ json_t *ep_poses_json(const ep_bake *bake) {
     json_t *pose = ep_pose_json(&bake->quality[i]);
     if (!pose) break;
     json_object_set_new(pose, "name",
-                        json_string(bake->shapes->shape[bake->shapes->example[i].shape].name));
+                        ep_json_text(bake->shapes->shape[bake->shapes->example[i].shape].name));
     json_array_append_new(list, pose);
   }
   return list;

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "app/report.h"
 #include "app/run/strip.h"
@@ -38,12 +39,12 @@ typedef struct series {
 } series;
 
 // What an earlier, longer run left there would be taken for frames of this one.
-static ep_status remove_later(const char *folder, const series *s, ep_error *err) {
+static ep_status remove_later(const char *folder, const char *stem, int from, ep_error *err) {
   char name[PATH_SHORT], path[EP_PATH_MAX];
-  for (int i = s->frames;; i++) {
-    snprintf(name, sizeof name, "%s-%04d.vtu", s->stem, i);
+  for (int i = from;; i++) {
+    snprintf(name, sizeof name, "%s-%04d.vtu", stem, i);
     EP_TRY(ep_path_join(folder, name, path, err));
-    if (remove(path) != 0) return EP_OK;
+    if (unlink(path) != 0) return EP_OK;
   }
 }
 
@@ -62,7 +63,7 @@ static ep_status write_series(const char *folder, const series *s, ep_error *err
     if (status == EP_OK) status = s->write(s->user, path, s->row[i], err);
     if (s->log) ep_progress(s->log, i + 1);
   }
-  if (status == EP_OK) status = remove_later(folder, s, err);
+  if (status == EP_OK) status = remove_later(folder, s->stem, s->frames, err);
   if (status == EP_OK) status = ep_path_join(folder, s->index, path, err);
   if (status == EP_OK) status = ep_mesh_write_pvd(path, s->frames, time, names, err);
   free(name);
@@ -252,6 +253,31 @@ static ep_status write_glb(const char *folder, const ep_scene *scene, const ep_m
   return status;
 }
 
+// Results of an earlier run in a format this one does not write: they would stand beside its
+// summary.
+static ep_status remove_others(const char *folder, unsigned formats, bool solids, ep_error *err) {
+  const bool vtu = formats & EP_FORMAT_VTU, glb = formats & EP_FORMAT_GLB;
+  const bool png = formats & EP_FORMAT_PNG;
+  const struct {
+    const char *file, *stem;
+    bool written;
+  } results[] = {
+      {"animation.pvd", "frames/frame", vtu},
+      {"obstacles.pvd", "frames/obstacles", vtu && solids},
+      {"animation.glb", NULL, glb},
+      {"strip.png", NULL, png},
+      {"final.png", NULL, png},
+  };
+  char path[EP_PATH_MAX];
+  for (size_t i = 0; i < sizeof results / sizeof *results; i++) {
+    if (results[i].written) continue;
+    EP_TRY(ep_path_join(folder, results[i].file, path, err));
+    EP_TRY(ep_file_remove(path, err));
+    if (results[i].stem) EP_TRY(remove_later(folder, results[i].stem, 0, err));
+  }
+  return EP_OK;
+}
+
 // ---- tables ----------------------------------------------------------------------------------
 
 static ep_status write_csv(const char *folder, const ep_model *model, const ep_record *record,
@@ -309,6 +335,7 @@ ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_s
     status = write_glb(folder, scene, mesh, model, record, frames, row, &solids, err);
   if (status == EP_OK && (scene->formats & EP_FORMAT_PNG))
     status = ep_strip_write(folder, scene, mesh, model, record, &solids, err);
+  if (status == EP_OK) status = remove_others(folder, scene->formats, solids.triangles > 0, err);
   ep_solids_free(&solids);
   free(row);
   return status;
@@ -365,10 +392,11 @@ static void text_motion(FILE *out, const json_t *report) {
 void ep_summary_text(FILE *out, const json_t *report) {
   size_t index;
   json_t *stage;
-  fprintf(out, "%s: %.0f vertices, %.0f tets, %.0f examples\n",
+  const double examples = ep_json_get_number(report, "examples");
+  fprintf(out, "%s: %.0f vertices, %.0f tets, %.0f example%s\n",
           json_string_value(json_object_get(report, "scene")),
-          ep_json_get_number(report, "vertices"), ep_json_get_number(report, "tets"),
-          ep_json_get_number(report, "examples"));
+          ep_json_get_number(report, "vertices"), ep_json_get_number(report, "tets"), examples,
+          examples == 1 ? "" : "s");
   fprintf(out, "m = %.0f eigenfunctions, r = %.0f modes, s = %.0f cubature elements\n",
           ep_json_get_number(report, "m"), ep_json_get_number(report, "r"),
           ep_json_get_number(report, "s"));
@@ -395,10 +423,23 @@ void ep_summary_text(FILE *out, const json_t *report) {
           ep_json_get_number(report, "inverted_tets"));
 }
 
-ep_status ep_outputs_begin(const char *folder, ep_error *err) {
+static ep_status not_of_frames(void *user, const char *path, ep_error *err) {
+  const char *frames = user;
+  char folder[EP_PATH_MAX];
+  EP_TRY(ep_path_folder(path, folder, err));
+  if (!ep_path_same(folder, frames)) return EP_OK;
+  return ep_fail(err, EP_ERR_IO,
+                 "the scene reads %s, which the frames of this run would write over; copy it "
+                 "elsewhere or give another --out",
+                 path);
+}
+
+ep_status ep_outputs_begin(const char *folder, const ep_scene *scene, ep_error *err) {
   static const char *const verdicts[] = {"summary.json", "summary.txt"};
   char path[EP_PATH_MAX];
   EP_TRY(ep_output_folder(folder, err));
+  EP_TRY(ep_path_join(folder, "frames", path, err));
+  EP_TRY(ep_scene_each_file(scene, not_of_frames, path, err));
   for (size_t i = 0; i < sizeof verdicts / sizeof *verdicts; i++) {
     EP_TRY(ep_path_join(folder, verdicts[i], path, err));
     EP_TRY(ep_file_remove(path, err));

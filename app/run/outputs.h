@@ -7,12 +7,14 @@
 #include "app/run/simulate.h"
 
 // Make the folder, see that it takes files, and take away the summary of an earlier run: a folder
-// with a summary holds a whole run.
-ep_status ep_outputs_begin(const char *folder, ep_error *err);
+// with a summary holds a whole run. Refused where the scene reads a frame of an earlier run there,
+// which would be written over.
+ep_status ep_outputs_begin(const char *folder, const ep_scene *scene, ep_error *err);
 
 // Write what scene->formats asks for into `folder` (begun), plus trajectory.csv. A record
 // cut short by a failure is written as far as it goes.
 //   frames/frame-0000.vtu .. and animation.pvd; animation.glb; strip.png, final.png
+// What an earlier run left there in other formats is taken away.
 ep_status ep_outputs_write(const char *folder, const ep_scene *scene, const ep_shapes *shapes,
                            const ep_model *model, const ep_record *record, ep_log *log,
                            ep_error *err);

@@ -175,7 +175,7 @@ static json_t *make_report(const ep_session *session, const ep_model_file *file,
   json_object_set_new(report, "example_fraction_most",
                       ep_json_number(farthest_fraction(model, record)));
   json_object_set_new(report, "warnings", json_integer(session->log.warnings));
-  json_object_set_new(report, "results", json_string(folder));
+  json_object_set_new(report, "results", ep_json_text(folder));
   return report;
 }
 
@@ -242,7 +242,7 @@ ep_status ep_command_run(const ep_cli *cli, ep_error *err) {
   EP_TRY(ep_session_open(cli, &session, err));
   ep_status status = ep_path_join("out", session.scene.name, fallback, err);
   const char *folder = cli->out ? cli->out : fallback;
-  if (status == EP_OK) status = ep_outputs_begin(folder, err);
+  if (status == EP_OK) status = ep_outputs_begin(folder, &session.scene, err);
   if (status == EP_OK) status = get_model(cli, &session, &model, err);
   if (status == EP_OK) status = simulate(cli, &session, &model, folder, err);
   ep_model_file_close(&model);

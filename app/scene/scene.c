@@ -6,9 +6,10 @@
 #include <string.h>
 
 #include "app/scene/scene_reader.h"
+#include "base/escape.h"
 #include "base/files.h"
 
-enum { SCENE_BYTES_MAX = 1 << 20 };
+enum { SCENE_BYTES_MAX = 1 << 20, NAME_MOST = 200 };
 
 static ep_status read_object(const ep_scene_reader *r, const raw_object *raw, ep_scene *out) {
   EP_TRY(ep_read_file(r, "object.mesh", raw->mesh, &out->mesh));
@@ -159,6 +160,22 @@ static ep_status read_output(const ep_scene_reader *r, const raw_output *raw, ep
   return EP_OK;
 }
 
+// Results go to out/NAME: one folder, and not out or what out lies in.
+static ep_status check_name(const ep_scene_reader *r, const char *name) {
+  if (strlen(name) > NAME_MOST)
+    return ep_read_refuse(r, "name", "%zu bytes are too long for a name; use at most %d",
+                          strlen(name), NAME_MOST);
+  if (strcmp(name, ".") == 0 || strcmp(name, "..") == 0)
+    return ep_read_refuse(r, "name", "'%s' names no folder of its own in out/; give another", name);
+  for (const char *p = name; *p; p++)
+    if (*p == '/' || (unsigned char)*p < ' ' || *p == 0x7f)
+      return ep_read_refuse(r, "name", "a name must not contain '/' or control characters");
+  if (ep_text_is_utf8(name)) return EP_OK;
+  return ep_read_refuse(r, "name",
+                        "the file's name, which is the scene's, is not UTF-8: rename the file or "
+                        "give `name`");
+}
+
 static ep_status convert(const ep_scene_reader *r, const raw_scene *raw, ep_scene *out) {
   if (raw->schema != 1)
     return ep_read_refuse(r, "schema", "%g is not a schema this version reads; it reads schema: 1",
@@ -167,7 +184,7 @@ static ep_status convert(const ep_scene_reader *r, const raw_scene *raw, ep_scen
   EP_TRY(ep_path_stem(r->name, stem, r->err));
   EP_TRY(ep_read_text(r, r->name, &out->path));
   EP_TRY(ep_read_text(r, raw->name ? raw->name : stem, &out->name));
-  if (strpbrk(out->name, "/\n")) return ep_read_refuse(r, "name", "a name must not contain '/'");
+  EP_TRY(check_name(r, out->name));
   int seed = 0;
   EP_TRY(ep_read_whole(r, "seed", raw->seed, 1, 0, 2147483647, &seed));
   out->seed = (uint64_t)seed;

@@ -210,6 +210,10 @@ ep_status ep_scene_parse(const char *path, const char *folder, const char *text,
                          int nsets, const char *const *sets, ep_scene *out, ep_error *err);
 void ep_scene_free(ep_scene *scene);
 
+// Calls for every file the scene reads, itself first, until a call fails.
+typedef ep_status ep_file_visit(void *user, const char *path, ep_error *err);
+ep_status ep_scene_each_file(const ep_scene *scene, ep_file_visit *call, void *user, ep_error *err);
+
 int ep_scene_examples(const ep_scene *scene); // poses of all families
 bool ep_scene_local(const ep_scene *scene);   // some family acts in a region only
 

@@ -12,9 +12,7 @@ ep_status ep_read_turn(const ep_scene_reader *r, const char *key, const raw_turn
   *out = (ep_turn){.degrees = 0};
   if (!raw) return EP_OK;
   snprintf(part, sizeof part, "%.90s.axis", key);
-  EP_TRY(ep_read_vector(r, part, raw->axis, out->axis));
-  if (out->axis[0] == 0 && out->axis[1] == 0 && out->axis[2] == 0)
-    return ep_read_refuse(r, part, "the axis is zero");
+  EP_TRY(ep_read_direction(r, part, "the axis", raw->axis, out->axis));
   snprintf(part, sizeof part, "%.90s.degrees", key);
   return ep_read_number(r, part, &raw->degrees, 0, -1e6, 1e6, &out->degrees);
 }
@@ -35,7 +33,7 @@ ep_status ep_read_motion(const ep_scene_reader *r, const char *key, unsigned cou
       return ep_read_refuse(r, part, "%g s does not come after %g s; order keyframes by time",
                             k->time, out->key[i - 1].time);
     snprintf(part, sizeof part, "%.80s.%u.move", key, i);
-    if (raw[i].move) EP_TRY(ep_read_vector(r, part, raw[i].move, k->move));
+    if (raw[i].move) EP_TRY(ep_read_bounded(r, part, raw[i].move, EP_PLACE_MOST, k->move));
     snprintf(part, sizeof part, "%.80s.%u.turn", key, i);
     EP_TRY(ep_read_turn(r, part, raw[i].turn, &k->turn));
   }
@@ -63,29 +61,36 @@ static void face(const double normal[3], double R[9]) {
 static ep_status read_plane(const ep_scene_reader *r, const char *key, const raw_plane *raw,
                             ep_scene_obstacle *out) {
   double normal[3];
+  char part[96];
   out->kind = EP_OBSTACLE_PLANE;
-  EP_TRY(ep_read_vector(r, key, raw->point, out->at.c));
-  EP_TRY(ep_read_vector(r, key, raw->normal, normal));
-  if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0)
-    return ep_read_refuse(r, key, "plane: the normal is zero");
+  snprintf(part, sizeof part, "%.60s.plane.point", key);
+  EP_TRY(ep_read_bounded(r, part, raw->point, EP_PLACE_MOST, out->at.c));
+  snprintf(part, sizeof part, "%.60s.plane.normal", key);
+  EP_TRY(ep_read_direction(r, part, "the normal", raw->normal, normal));
   face(normal, out->at.R);
   return EP_OK;
 }
 
 static ep_status read_sphere(const ep_scene_reader *r, const char *key, const raw_sphere *raw,
                              ep_scene_obstacle *out) {
+  char part[96];
   out->kind = EP_OBSTACLE_SPHERE;
-  EP_TRY(ep_read_vector(r, key, raw->center, out->at.c));
-  return ep_read_number(r, key, &raw->radius, 0, 1e-9, 1e9, &out->size[0]);
+  snprintf(part, sizeof part, "%.60s.sphere.center", key);
+  EP_TRY(ep_read_bounded(r, part, raw->center, EP_PLACE_MOST, out->at.c));
+  snprintf(part, sizeof part, "%.60s.sphere.radius", key);
+  return ep_read_number(r, part, &raw->radius, 0, 1e-9, 1e9, &out->size[0]);
 }
 
 static ep_status read_box(const ep_scene_reader *r, const char *key, const raw_solid_box *raw,
                           ep_scene_obstacle *out) {
   double low[3], high[3];
   ep_turn turn;
+  char part[96];
   out->kind = EP_OBSTACLE_BOX;
-  EP_TRY(ep_read_vector(r, key, raw->low, low));
-  EP_TRY(ep_read_vector(r, key, raw->high, high));
+  snprintf(part, sizeof part, "%.60s.box.low", key);
+  EP_TRY(ep_read_bounded(r, part, raw->low, EP_PLACE_MOST, low));
+  snprintf(part, sizeof part, "%.60s.box.high", key);
+  EP_TRY(ep_read_bounded(r, part, raw->high, EP_PLACE_MOST, high));
   for (int i = 0; i < 3; i++) {
     if (!(low[i] < high[i]))
       return ep_read_refuse(r, key, "box: low %g is not below high %g on axis %d", low[i], high[i],
@@ -116,15 +121,17 @@ static ep_status read_obstacle(const ep_scene_reader *r, unsigned index, const r
   return ep_read_motion(r, key, raw->motion_count, raw->motion, raw->smooth, &out->motion);
 }
 
+static const double stiffest = 1e20; // Pa/m; far above diamond over a micrometre
+
 // "auto" (or nothing) or a number.
 static ep_status read_stiffness(const ep_scene_reader *r, const char *text, double *out) {
   char *end;
   *out = 0;
   if (!text || strcmp(text, "auto") == 0) return EP_OK;
   *out = strtod(text, &end);
-  if (end == text || *end || !(*out > 0) || !isfinite(*out))
-    return ep_read_refuse(r, "contact.stiffness", "'%.40s': use auto or a positive number [Pa/m]",
-                          text);
+  if (end == text || *end || !(*out > 0) || !(*out <= stiffest))
+    return ep_read_refuse(r, "contact.stiffness",
+                          "'%.40s': use auto or a positive number up to %g [Pa/m]", text, stiffest);
   return EP_OK;
 }
 

@@ -52,7 +52,7 @@ static ep_status read_drag(const ep_scene_reader *r, const char *key, const raw_
       return ep_read_refuse(r, part, "%g s does not come after %g s; order the path by time",
                             k->time, k[-1].time);
     snprintf(part, sizeof part, "%.80s.path.%u.at", key, i);
-    EP_TRY(ep_read_vector(r, part, raw->path[i].at, k->move));
+    EP_TRY(ep_read_bounded(r, part, raw->path[i].at, EP_PLACE_MOST, k->move));
   }
   snprintf(part, sizeof part, "%.80s.stiffness", key);
   EP_TRY(ep_read_number(r, part, &raw->stiffness, 0, 1e-9, 1e12, &out->stiffness));

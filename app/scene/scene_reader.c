@@ -80,6 +80,26 @@ ep_status ep_read_vector(const ep_scene_reader *r, const char *key, const double
   return EP_OK;
 }
 
+ep_status ep_read_bounded(const ep_scene_reader *r, const char *key, const double *given,
+                          double most, double *out) {
+  EP_TRY(ep_read_vector(r, key, given, out));
+  for (int i = 0; i < 3; i++)
+    if (fabs(out[i]) > most)
+      return ep_read_refuse(r, key, "component %d, %g, is out of range; use %g to %g", i, out[i],
+                            -most, most);
+  return EP_OK;
+}
+
+ep_status ep_read_direction(const ep_scene_reader *r, const char *key, const char *what,
+                            const double *given, double *out) {
+  EP_TRY(ep_read_vector(r, key, given, out));
+  const double largest = fmax(fabs(out[0]), fmax(fabs(out[1]), fabs(out[2])));
+  if (largest == 0) return ep_read_refuse(r, key, "%s is zero", what);
+  const int exponent = ilogb(largest);
+  for (int i = 0; i < 3; i++) out[i] = ldexp(out[i], -exponent);
+  return EP_OK;
+}
+
 ep_status ep_read_text(const ep_scene_reader *r, const char *text, char **out) {
   *out = strdup(text);
   return *out ? EP_OK : ep_fail(r->err, EP_ERR_MEMORY, "no memory for the scene");
@@ -129,13 +149,12 @@ ep_status ep_read_selection(const ep_scene_reader *r, const char *key, const raw
   }
   out->kind = box ? EP_SELECT_BOX : EP_SELECT_PLANE;
   EP_TRY(ep_read_vector(r, key, box ? box->low : plane->point, out->a));
-  EP_TRY(ep_read_vector(r, key, box ? box->high : plane->normal, out->b));
-  for (int i = 0; box && i < 3; i++)
+  if (plane) return ep_read_direction(r, key, "plane: the normal", plane->normal, out->b);
+  EP_TRY(ep_read_vector(r, key, box->high, out->b));
+  for (int i = 0; i < 3; i++)
     if (out->a[i] > out->b[i])
       return ep_read_refuse(r, key, "box: low %g lies above high %g on axis %d", out->a[i],
                             out->b[i], i);
-  if (plane && out->b[0] == 0 && out->b[1] == 0 && out->b[2] == 0)
-    return ep_read_refuse(r, key, "plane: the normal is zero");
   return EP_OK;
 }
 
@@ -143,11 +162,30 @@ ep_status ep_read_no_memory(const ep_scene_reader *r) {
   return ep_fail(r->err, EP_ERR_MEMORY, "no memory for the scene");
 }
 
+// NLopt's that go by gradients and need no second optimizer (LD_AUGLAG does).
+static const char *const algorithms[] = {
+    "LD_LBFGS",
+    "LD_SLSQP",
+    "LD_MMA",
+    "LD_CCSAQ",
+    "LD_VAR1",
+    "LD_VAR2",
+    "LD_TNEWTON",
+    "LD_TNEWTON_RESTART",
+    "LD_TNEWTON_PRECOND",
+    "LD_TNEWTON_PRECOND_RESTART",
+};
+
 ep_status ep_read_algorithm(const ep_scene_reader *r, const char *key, const char *name,
                             char out[48]) {
-  if (strncmp(name, "LD_", 3) != 0 || strlen(name) > 47)
-    return ep_read_refuse(
-        r, key, "'%.60s' is no local algorithm with gradients; use one as LD_LBFGS", name);
-  snprintf(out, 48, "%s", name);
-  return EP_OK;
+  for (size_t i = 0; i < sizeof algorithms / sizeof *algorithms; i++) {
+    if (strcmp(name, algorithms[i]) != 0) continue;
+    snprintf(out, 48, "%s", name);
+    return EP_OK;
+  }
+  return ep_read_refuse(r, key,
+                        "'%.60s' is no local algorithm with gradients; there are LD_LBFGS, "
+                        "LD_SLSQP, LD_MMA, LD_CCSAQ, LD_VAR1, LD_VAR2, LD_TNEWTON, "
+                        "LD_TNEWTON_RESTART, LD_TNEWTON_PRECOND, LD_TNEWTON_PRECOND_RESTART",
+                        name);
 }

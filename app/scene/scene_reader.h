@@ -6,6 +6,9 @@
 #include "app/scene/scene.h"
 #include "app/scene/scene_load.h"
 
+// Places, ways [m], speeds [m/s] and spins [1/s]: beyond, doubles tell no shape of a metre apart.
+#define EP_PLACE_MOST 1e9
+
 // What the conversion of one scene needs everywhere.
 typedef struct ep_scene_reader {
   ep_scene_text *loaded;
@@ -32,13 +35,20 @@ ep_status ep_read_whole(const ep_scene_reader *r, const char *key, const double 
                         int fallback, int low, int high, int *out);
 ep_status ep_read_vector(const ep_scene_reader *r, const char *key, const double *given,
                          double *out);                                          // (3)
+// Components from -most to most.
+ep_status ep_read_bounded(const ep_scene_reader *r, const char *key, const double *given,
+                          double most, double *out); // (3)
+// Not zero, however short or long: scaled by a power of two to a largest component of 1 to 2, so
+// that its square is a number. what: "the normal".
+ep_status ep_read_direction(const ep_scene_reader *r, const char *key, const char *what,
+                            const double *given, double *out); // (3)
 ep_status ep_read_text(const ep_scene_reader *r, const char *text, char **out); // malloc'd
 // Resolve a path relative to the scene and see that the file is there; malloc'd.
 ep_status ep_read_file(const ep_scene_reader *r, const char *key, const char *path, char **out);
 // Exactly one of box, plane, file, field must be given.
 ep_status ep_read_selection(const ep_scene_reader *r, const char *key, const raw_selection *raw,
                             ep_selection *out);
-// A local gradient-based algorithm of NLopt by name; whether NLopt has it shows when it is made.
+// A local gradient-based algorithm of NLopt by name.
 ep_status ep_read_algorithm(const ep_scene_reader *r, const char *key, const char *name,
                             char out[48]);
 

@@ -11,9 +11,10 @@ ep_status ep_read_start(const ep_scene_reader *r, const raw_scene *raw, ep_scene
                           "take `start` or `fixed` out");
   start->placed = given->position != NULL;
   if (given->position)
-    EP_TRY(ep_read_vector(r, "start.position", given->position, start->position));
+    EP_TRY(ep_read_bounded(r, "start.position", given->position, EP_PLACE_MOST, start->position));
   if (given->velocity)
-    EP_TRY(ep_read_vector(r, "start.velocity", given->velocity, start->velocity));
-  if (given->spin) EP_TRY(ep_read_vector(r, "start.spin", given->spin, start->spin));
+    EP_TRY(ep_read_bounded(r, "start.velocity", given->velocity, EP_PLACE_MOST, start->velocity));
+  if (given->spin)
+    EP_TRY(ep_read_bounded(r, "start.spin", given->spin, EP_PLACE_MOST, start->spin));
   return ep_read_turn(r, "start.rotation", given->rotation, &start->rotation);
 }

@@ -53,8 +53,11 @@ static ep_status take_number(const char *name, int line, char **text, const ep_m
                              unsigned char *chosen, int *count, ep_error *err) {
   char *end;
   const long number = strtol(*text, &end, 10);
+  const size_t word = strcspn(*text, ", \t\r\n;#");
+  const int shown = word < 24 ? (int)word : 24;
   if (end == *text || (*end && !strchr(", \t\r\n;#", *end)))
-    return ep_fail(err, EP_ERR_FORMAT, "%s:%d: '%.12s' is no vertex number", name, line, *text);
+    return ep_fail(err, EP_ERR_FORMAT, "%s:%d: '%.*s' is no vertex number", name, line, shown,
+                   *text);
   if (number < 1 || number > mesh->file_vertices)
     return ep_fail(err, EP_ERR_FORMAT, "%s:%d: vertex %ld does not exist; %s has 1 to %d", name,
                    line, number, mesh->name, mesh->file_vertices);

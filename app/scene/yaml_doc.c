@@ -17,9 +17,18 @@ static bool is_tab(const char *text, size_t size, size_t at) {
   return false;
 }
 
+static int line_of(const char *text, size_t size, size_t offset) {
+  int line = 1;
+  for (size_t i = 0; i < size && i < offset; i++) line += text[i] == '\n';
+  return line;
+}
+
 static ep_status syntax_error(const yaml_parser_t *parser, const char *name, const char *text,
                               size_t size, ep_error *err) {
   const char *problem = parser->problem ? parser->problem : "not YAML";
+  if (parser->error == YAML_READER_ERROR) // its place is an offset in bytes
+    return ep_fail(err, EP_ERR_SCENE, "%s:%d: %s; a scene is saved as UTF-8", name,
+                   line_of(text, size, parser->problem_offset), problem);
   if (is_tab(text, size, parser->problem_mark.index)) problem = "a tab: YAML is indented by blanks";
   return ep_fail(err, EP_ERR_SCENE, "%s:%zu:%zu: %s", name, parser->problem_mark.line + 1,
                  parser->problem_mark.column + 1, problem);

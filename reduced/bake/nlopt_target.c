@@ -84,9 +84,12 @@ static double objective(unsigned n, const double *y, double *gradient, void *use
 
 // ---- public ------------------------------------------------------------------------------------
 
+// LD_AUGLAG and LD_AUGLAG_EQ call a second optimizer without looking whether there is one;
+// LD_LBFGS_NOCEDAL is a name without an algorithm.
 static int usable(nlopt_algorithm a) {
   const char *name = nlopt_algorithm_to_string(a);
-  return strncmp(name, "LD_", 3) == 0;
+  return strncmp(name, "LD_", 3) == 0 && strncmp(name, "LD_AUGLAG", 9) != 0 &&
+         strcmp(name, "LD_LBFGS_NOCEDAL") != 0;
 }
 
 static ep_status allocate(ep_nlopt_target *t, const ep_state *state, ep_error *err) {

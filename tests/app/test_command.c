@@ -1,7 +1,8 @@
 // Claims, through the real program: a scene runs end to end and takes its example's shape; the
 // second run takes every stage from the cache; a changed value bakes only what depends on it; two
-// bakes are byte-identical; damaged caches and models are baked again; mistakes end with the
-// documented exit code and one message; stdout carries one JSON object.
+// bakes are byte-identical; what is read is never written over; damaged caches and models are baked
+// again; mistakes end with the documented exit code and one message; stdout carries one JSON
+// object.
 #include <jansson.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -173,6 +174,86 @@ static void failures_are_json_too(void **state) {
   json_decref(root);
 }
 
+// A bake or a picture of a mesh never replaces what it is made of.
+static void inputs_are_not_written_over(void **state) {
+  (void)state;
+  assert_int_equal(system("rm -rf over && mkdir over && cp beam.veg beam-bent.veg beam.yaml over &&"
+                          "cp -r over kept && ln -s beam.veg over/link.veg"),
+                   0);
+  expect_failure(2, "over/beam.yaml", "bake over/beam.yaml --out over/beam.yaml");
+  expect_failure(2, "over/beam-bent.veg", "bake over/beam.yaml --out over/beam-bent.veg");
+  expect_failure(2, "over/beam.veg", "eigen over/beam.veg --out over/beam.veg");
+  expect_failure(2, "over/link.veg", "check over/beam.veg --repair over/link.veg");
+  expect_failure(2, "device", "eigen over/beam.veg --out /dev/null");
+  assert_int_equal(system("for f in kept/*; do cmp $f over/${f#kept/} || exit 1; done; rm -r kept"),
+                   0);
+  // a frame of an earlier run as a pose
+  assert_int_equal(program("", "run beam.yaml --cache cache-a --out over/run "
+                               "--set output.formats=[vtu]"),
+                   0);
+  expect_failure(2, "frame-0003.vtu",
+                 "run beam.yaml --cache cache-a --out over/run "
+                 "--set families.0.poses.0=over/run/frames/frame-0003.vtu");
+  assert_true(ep_path_exists("over/run/summary.json"));
+}
+
+static void formats_of_an_earlier_run_are_taken_away(void **state) {
+  (void)state;
+  static const char *const others[] = {"animation.pvd", "frames/frame-0000.vtu",
+                                       "obstacles.pvd", "frames/obstacles-0000.vtu",
+                                       "animation.glb", "strip.png",
+                                       "final.png"};
+  assert_int_equal(program("", "run beam.yaml --cache cache-a --out fewer "
+                               "--set simulation.steps=20 --set "
+                               "'obstacles=[{plane: {point: [0, -5, 0], normal: [0, 1, 0]}}]'"),
+                   0);
+  for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
+    char path[64];
+    snprintf(path, sizeof path, "fewer/%s", others[i]);
+    if (!ep_path_exists(path)) fail_msg("%s is missing", path);
+  }
+  assert_int_equal(
+      program("", "run beam.yaml --cache cache-a --out fewer --set simulation.steps=5"), 0);
+  assert_true(ep_path_exists("fewer/animation.pvd") && !ep_path_exists("fewer/obstacles.pvd"));
+  assert_false(ep_path_exists("fewer/frames/obstacles-0000.vtu"));
+  assert_int_equal(program("", "run beam.yaml --cache cache-a --out fewer --set output.formats=[]"),
+                   0);
+  for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
+    char path[64];
+    snprintf(path, sizeof path, "fewer/%s", others[i]);
+    if (ep_path_exists(path)) fail_msg("%s is of an earlier run", path);
+  }
+  assert_true(ep_path_exists("fewer/trajectory.csv") && ep_path_exists("fewer/summary.json"));
+}
+
+// JSON holds no Latin-1; names of files do.
+static void names_of_files_may_be_any_bytes(void **state) {
+  (void)state;
+  assert_int_equal(
+      system("rm -rf caf* && mkdir caf\xe9 && cp beam.veg beam-bent.veg cut.veg beam.yaml "
+             "wrong.yaml caf\xe9"),
+      0);
+  static const char replaced[] = "caf\xef\xbf\xbd";
+  assert_int_equal(program("", "run caf\xe9/beam.yaml --json --cache caf\xe9/cache --out "
+                               "caf\xe9/out --set simulation.steps=2"),
+                   0);
+  json_t *root = report();
+  assert_non_null(strstr(json_string_value(json_object_get(root, "results")), replaced));
+  json_decref(root);
+  assert_int_equal(program("", "check caf\xe9/cut.veg --json"), 10);
+  root = report();
+  const json_t *found = json_array_get(json_object_get(root, "findings"), 0);
+  assert_non_null(strstr(json_string_value(json_object_get(found, "file")), replaced));
+  json_decref(root);
+  assert_int_equal(program("", "plan caf\xe9/wrong.yaml --json"), 5);
+  root = report();
+  const json_t *failure = json_object_get(root, "error");
+  assert_non_null(strstr(json_string_value(json_object_get(failure, "message")), replaced));
+  json_decref(root);
+  assert_int_equal(program("", "eigen caf\xe9/beam.veg --count 3 --json"), 0);
+  json_decref(report());
+}
+
 // RLIMIT_FSIZE stands for a full disk: the run fails with a message, and leaves no half result.
 // (A run from a warm cache: MPI, which the baker starts, does not bear the limit.)
 static void a_full_disk_is_said(void **state) {
@@ -240,6 +321,9 @@ int main(void) {
       cmocka_unit_test(damaged_results_are_baked_again),
       cmocka_unit_test(mistakes_have_documented_exit_codes),
       cmocka_unit_test(failures_are_json_too),
+      cmocka_unit_test(inputs_are_not_written_over),
+      cmocka_unit_test(formats_of_an_earlier_run_are_taken_away),
+      cmocka_unit_test(names_of_files_may_be_any_bytes),
       cmocka_unit_test(a_full_disk_is_said),
       cmocka_unit_test(eigenvalues_and_plans_are_printed),
   };

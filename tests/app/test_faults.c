@@ -4,6 +4,7 @@
 // written is ever taken as whole: the next run bakes the same bytes as one nobody disturbed.
 //
 // EP_FAULTS_THOROUGH=1 fails every allocation instead of a sample and kills 60 times.
+#include <poll.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -200,6 +201,37 @@ static void killed_at_any_time_it_recovers(void **state) {
   }
 }
 
+// Whoever kills a run must not go on paying for its bake: the pipe's other end is held by the run
+// and the baker it starts, and closes when both are gone.
+static void a_bake_ends_with_its_run(void **state) {
+  (void)state;
+  int ends[2];
+  write_box("large.veg", 24, 6, 6, 1, 0, 3e4); // baked in minutes
+  assert_int_equal(pipe(ends), 0);
+  const pid_t child = fork();
+  if (child < 0) fail_msg("cannot fork");
+  if (child == 0) {
+    close(ends[0]);
+    if (!freopen("/dev/null", "w", stdout) || !freopen("/dev/null", "w", stderr)) _exit(1);
+    execl(EP_COMMAND, EP_COMMAND, "run", "beam.yaml", "--out", "orphan", "--cache", "cache-orphan",
+          "--set", "object.mesh=large.veg", "--set", "families=[]", "--set",
+          "reduction={modes: 40, linear_modes: 40, elements: 500, training_poses: 10000}",
+          (char *)NULL);
+    _exit(1);
+  }
+  close(ends[1]);
+  const struct timespec time = {.tv_nsec = 600000000};
+  nanosleep(&time, NULL);
+  kill(child, SIGKILL); // not the baker
+  int status;
+  waitpid(child, &status, 0);
+  struct pollfd end = {.fd = ends[0]};
+  const int gone = poll(&end, 1, 3000);
+  close(ends[0]);
+  if (!WIFSIGNALED(status)) fail_msg("the bake is too fast for this test");
+  if (gone != 1) fail_msg("the baker goes on without its run");
+}
+
 // ---- two at once -------------------------------------------------------------------------------
 
 static void two_may_bake_the_same_scene(void **state) {
@@ -237,6 +269,7 @@ int main(void) {
 #endif
       cmocka_unit_test(a_full_disk_loses_nothing),
       cmocka_unit_test(killed_at_any_time_it_recovers),
+      cmocka_unit_test(a_bake_ends_with_its_run),
       cmocka_unit_test(two_may_bake_the_same_scene),
   };
   return cmocka_run_group_tests(tests, prepare, NULL);

@@ -2,10 +2,12 @@
 // with the place (line:column) and the key, numbers with something behind them too, and the key
 // that was meant is said; --set is checked like the file; selections hold exactly the vertices
 // geometry says.
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
 // clang-format off
 #include <cmocka.h>
@@ -186,6 +188,74 @@ static void mistakes_are_named_with_their_place(void **state) {
   refused(HEAD "loads: [{push: {file: held.txt, force: [0, 0, 1], until: 1, ramp: 0.6}}]\n",
           "s.yaml:3", "do not fit");
   refused("schema: 1\nobject: {mesh: box.veg, material: {young: 1e5}}\n", "s.yaml:2", "all of");
+  refused(HEAD "examples: {algorithm: LD_AUGLAG}\n", "s.yaml:3:23", "LD_LBFGS");
+  refused(HEAD "examples: {algorithm: LD_LBGFS}\n", "s.yaml:3:23", "LD_LBFGS");
+  refused(HEAD "start: {position: [0, 1e12, 0]}\n", "s.yaml:3:19", "component 1, 1e+12");
+  refused(HEAD "#\nname: caf\xe9\n", "s.yaml:4: ", "UTF-8");
+}
+
+// Results go to out/NAME.
+static void names_are_folders_of_their_own(void **state) {
+  (void)state;
+  refused(HEAD "name: .\n", "s.yaml:3:7: name", "no folder of its own");
+  refused(HEAD "name: ..\n", "s.yaml:3:7: name", "no folder of its own");
+  refused(HEAD "name: a/b\n", "s.yaml:3:7: name", "'/'");
+  refused(HEAD "name: \"a\\nb\"\n", "s.yaml:3:7: name", "control");
+  char text[400] = HEAD "name: ";
+  memset(text + strlen(text), 'n', 201);
+  refused(text, "s.yaml:3:7: name", "at most 200");
+  ep_scene scene;
+  ep_error err = {0};
+  assert_int_equal(ep_scene_parse("caf\xe9.yaml", ".", HEAD, strlen(HEAD), 0, NULL, &scene, &err),
+                   EP_ERR_SCENE);
+  assert_non_null(strstr(err.text, "give `name`"));
+}
+
+// What is too large, too small or empty is told by its own key.
+static void obstacles_are_refused_by_key(void **state) {
+  (void)state;
+#define OBSTACLE(text) HEAD "obstacles:\n  - " text "\n"
+  refused(OBSTACLE("sphere: {center: [0, 0, 0], radius: 0}"),
+          "s.yaml:4:41: obstacles.0.sphere.radius", "out of range");
+  refused(OBSTACLE("sphere: {center: [0, -1e15, 0], radius: 1}"),
+          "s.yaml:4:22: obstacles.0.sphere.center", "-1e+15");
+  refused(OBSTACLE("box: {low: [-1e30, 0, 0], high: [1, 1, 1]}"),
+          "s.yaml:4:16: obstacles.0.box.low", "-1e+30");
+  refused(OBSTACLE("plane: {point: [0, 1e30, 0], normal: [0, 1, 0]}"),
+          "s.yaml:4:20: obstacles.0.plane.point", "1e+30");
+  refused(OBSTACLE("plane: {point: [0, 0, 0], normal: [0, 0, 0]}"),
+          "s.yaml:4:39: obstacles.0.plane.normal", "zero");
+  refused(OBSTACLE("plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n    motion: [{time: 0, move: [0, "
+                   "1e30, 0]}]"),
+          "s.yaml:5", "1e+30");
+  refused(HEAD "contact: {stiffness: 1e30}\n", "s.yaml:3:22", "up to 1e+20");
+}
+
+// Their squares are no numbers: the direction is the same at any length.
+static void directions_may_have_any_length(void **state) {
+  (void)state;
+  static const char *const scale[] = {"1", "1e-200", "1e30"};
+  double normal[3], first[9], axis[9];
+  for (int i = 0; i < 3; i++) {
+    char text[400];
+    ep_scene s;
+    ep_error err;
+    snprintf(text, sizeof text,
+             HEAD "start: {rotation: {axis: [0, %s, 0], degrees: 90}}\n"
+                  "obstacles:\n  - plane: {point: [0, 0, 0], normal: [0, %s, 0]}\n"
+                  "regions: [{name: a, plane: {point: [0, 0, 0], normal: [0, %s, 0]}}]\n",
+             scale[i], scale[i], scale[i]);
+    if (parse_with(text, 0, NULL, &s, &err) != EP_OK) fail_msg("%s: %s", text, err.text);
+    ep_turn_matrix(&s.start.rotation, axis);
+    if (i == 0) memcpy(first, axis, sizeof first);
+    for (int a = 0; a < 3; a++) normal[a] = s.obstacle[0].at.R[3 * a + 2];
+    const double at[3] = {0.3, 0.5, 0.7};
+    const double away = ep_select_distance(&s.region[0].where, at);
+    ep_scene_free(&s);
+    for (int a = 0; a < 9; a++) assert_true(fabs(axis[a] - first[a]) < 1e-15);
+    for (int a = 0; a < 3; a++) assert_true(normal[a] == (a == 1));
+    assert_true(fabs(away - 0.5) < 1e-15);
+  }
 }
 
 // libcyaml reads "3e5 Pa" as 3e5 and "flase" as true.
@@ -354,6 +424,9 @@ int main(void) {
       cmocka_unit_test(everything_is_read),
       cmocka_unit_test(json_is_a_scene_too),
       cmocka_unit_test(mistakes_are_named_with_their_place),
+      cmocka_unit_test(names_are_folders_of_their_own),
+      cmocka_unit_test(obstacles_are_refused_by_key),
+      cmocka_unit_test(directions_may_have_any_length),
       cmocka_unit_test(values_are_read_to_their_end),
       cmocka_unit_test(what_was_meant_is_said),
       cmocka_unit_test(overrides_are_checked_like_the_file),

@@ -188,6 +188,57 @@ static void texts_are_fit_for_attributes(void **state) {
   free(text);
 }
 
+// RFC 3629: shortest forms only, no surrogates, nothing above U+10FFFF.
+static void any_bytes_become_utf8(void **state) {
+  (void)state;
+  static const struct {
+    const char *text, *readable; // NULL: as it is
+  } cases[] = {{"", NULL},
+               {"caf\xc3\xa9 \xf0\x9f\x92\x83", NULL},
+               {"\xed\x9f\xbf\xee\x80\x80\xf4\x8f\xbf\xbf", NULL},
+               {"caf\xe9", "caf\xef\xbf\xbd"},
+               {"\xe9.veg", "\xef\xbf\xbd.veg"},
+               {"\xc0\xaf", "\xef\xbf\xbd\xef\xbf\xbd"},
+               {"\xe0\x80\xaf", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"},
+               {"\xed\xa0\x80", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"},
+               {"a\xf0\x9f\x92", "a\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd"}};
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    char *readable = ep_text_to_utf8(cases[i].text);
+    assert_int_equal(ep_text_is_utf8(cases[i].text), cases[i].readable == NULL);
+    assert_string_equal(readable, cases[i].readable ? cases[i].readable : cases[i].text);
+    assert_true(ep_text_is_utf8(readable));
+    free(readable);
+  }
+}
+
+// A rename onto a device would put a file in its place, and /dev/zero never ends.
+static void devices_and_inputs_are_no_results(void **state) {
+  (void)state;
+  ep_error err = {0};
+  ep_output out;
+  char *text;
+  size_t size;
+  const ep_status opened = ep_output_open(&out, "/dev/null", &err);
+  if (opened == EP_OK) ep_output_discard(&out);
+  assert_int_equal(opened, EP_ERR_IO);
+  assert_non_null(strstr(err.text, "device"));
+  err = (ep_error){0};
+  assert_int_equal(ep_output_place("/dev/null", &err), EP_ERR_IO);
+  err = (ep_error){0};
+  assert_int_equal(ep_output_open(&out, ".", &err), EP_ERR_IO);
+  assert_non_null(strstr(err.text, "folder"));
+  err = (ep_error){0};
+  assert_int_equal(ep_file_read("/dev/null", &text, &size, &err), EP_ERR_IO);
+  assert_non_null(strstr(err.text, "device"));
+  assert_int_equal(ep_file_write("abc", "abc", 3, NULL), EP_OK);
+  ep_file_remove("def", NULL);
+  assert_int_equal(symlink("abc", "def"), 0);
+  err = (ep_error){0};
+  assert_int_equal(ep_output_spares("def", "./abc", &err), EP_ERR_IO);
+  assert_non_null(strstr(err.text, "def"));
+  assert_int_equal(ep_output_spares("new", "./abc", NULL), EP_OK);
+}
+
 static void hashes_tell_contents_apart(void **state) {
   (void)state;
   const ep_digest a = ep_hash_bytes("abc", 3), b = ep_hash_bytes("abd", 3);
@@ -211,6 +262,8 @@ int main(void) {
       cmocka_unit_test(random_numbers_repeat_and_are_uniform),
       cmocka_unit_test(forests_hold_the_closure_of_their_pairs),
       cmocka_unit_test(texts_are_fit_for_attributes),
+      cmocka_unit_test(any_bytes_become_utf8),
+      cmocka_unit_test(devices_and_inputs_are_no_results),
       cmocka_unit_test(hashes_tell_contents_apart),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -95,8 +95,9 @@ static void giving_up_is_said(void **unused) {
   assert_int_equal(ep_nlopt_target_solve(target, s, w, q, 1e-6, NULL), EP_ERR_NUMERIC);
   assert_memory_equal(q, zero, sizeof q);
   ep_nlopt_target_free(target);
-  static const char *const bad[] = {"LN_COBYLA", "GN_DIRECT", "nonsense", ""};
-  for (int i = 0; i < 4; i++) {
+  static const char *const bad[] = {"LN_COBYLA", "GN_DIRECT",    "nonsense",        "",
+                                    "LD_AUGLAG", "LD_AUGLAG_EQ", "LD_LBFGS_NOCEDAL"};
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     err = (ep_error){0};
     assert_int_equal(ep_nlopt_target_create(s, bad[i], 0, &target, &err), EP_ERR_ARGUMENT);
     assert_null(target);
