@@ -32,6 +32,11 @@ static void predict_bdf2(size_t n, double h, const ep_motion *m, double *base, d
   }
 }
 
+double ep_integrator_before(ep_integrator kind, double dt, double dt_before) {
+  static const double most = 2.414;
+  return kind == EP_BDF2 && dt > most * dt_before ? 0 : dt_before;
+}
+
 void ep_integrator_predict(ep_integrator kind, size_t n, double dt, const ep_motion *motion,
                            double *base, double *ahead, double *rate, double *inertia) {
   *rate = 1 / dt;

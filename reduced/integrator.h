@@ -33,6 +33,12 @@ typedef struct ep_motion {
                                      // local error h^2 keeps the order
 } ep_motion;
 
+// dt_before, or 0 where the step before it is not to be gone by: BDF2 is not stable where steps
+// grow more than 1 + sqrt(2) times (Hairer, Norsett, Wanner, Solving ODEs I, III.5): what the two
+// steps before differ in would be drawn out far ahead, after an impact or where Newton's errors are
+// all there is.
+double ep_integrator_before(ep_integrator kind, double dt, double dt_before);
+
 // base and ahead (n) of a step of dt; returns through rate [1/s] and inertia [1/s^2].
 void ep_integrator_predict(ep_integrator kind, size_t n, double dt, const ep_motion *motion,
                            double *base, double *ahead, double *rate, double *inertia);

@@ -189,7 +189,8 @@ static void notice_writing(ep_step_run *s) {
   const size_t bytes = (size_t)state->model->size.r * sizeof *state->q;
   const int wrote_q = memcmp(state->q, state->end_q, bytes) != 0;
   const int wrote = wrote_q || memcmp(state->v, state->end_v, bytes) != 0;
-  s->dt_before = wrote || state->end_integrator != (int)s->def->integrator ? 0 : state->dt_before;
+  const int anew = wrote || state->end_integrator != (int)s->def->integrator;
+  s->dt_before = anew ? 0 : ep_integrator_before(s->def->integrator, s->def->dt, state->dt_before);
   s->a = state->a;
   if (!wrote_q) return;
   state->guards_soft = 0;

@@ -236,6 +236,7 @@ static ep_status predict(ep_full_move *m, ep_error *err) {
       memcmp(full->v, full->end_v, n3 * sizeof *full->v) != 0 ||
       full->end_integrator != (int)m->def->integrator)
     full->dt_before = 0;
+  full->dt_before = ep_integrator_before(m->def->integrator, m->def->dt, full->dt_before);
   if (m->def->integrator == EP_NEWMARK && full->dt_before == 0) EP_TRY(start_acceleration(m, err));
   const ep_motion motion = {.q = full->u,
                             .v = full->v,
