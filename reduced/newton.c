@@ -107,10 +107,9 @@ ep_status ep_newton_minimise(ep_state *state, ep_newton *newton) {
   newton->evaluations++;
   for (;;) {
     newton->residual_now = newton->residual(newton->user, state->x, state->g);
+    if (!isfinite(newton->energy_now) || !isfinite(newton->residual_now)) return EP_ERR_NUMERIC;
     if (newton->residual_now <= newton->tolerance) return EP_OK;
-    if (newton->iterations == newton->max_iterations || !isfinite(newton->energy_now) ||
-        !isfinite(newton->residual_now))
-      return EP_ERR_NUMERIC;
+    if (newton->iterations == newton->max_iterations) return EP_ERR_NUMERIC;
     newton->iterations++;
     if (!factor_hessian(state, newton)) return EP_ERR_NUMERIC;
     for (int a = 0; a < r; a++) state->direction[a] = -state->g[a];
@@ -132,5 +131,5 @@ ep_status ep_newton_minimise(ep_state *state, ep_newton *newton) {
     if (step == 0) return EP_ERR_NUMERIC;
   }
   newton->residual_now = newton->residual(newton->user, state->x, state->g);
-  return EP_OK;
+  return isfinite(newton->energy_now) && isfinite(newton->residual_now) ? EP_OK : EP_ERR_NUMERIC;
 }
