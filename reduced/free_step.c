@@ -281,8 +281,9 @@ static void end_momentum(const ep_free_step *f, const double ahead[3], const dou
   for (int i = 0; i < 3; i++) out[i] = drag * (ahead[i] + (force[i] + contact[i]) / f->rate);
 }
 
-// R at the end of the step free of contact, into f->turned. The torque of pulls depends on it.
-static int free_rotation(ep_free_step *f, const double *x) {
+// R at the end of the step free of contact, into f->turned. The torque of pulls depends on where
+// the step ends: there, or at the iterate's rotation.
+static int free_rotation(ep_free_step *f, const double *x, const double *rotation) {
   ep_state *state = f->state;
   const int r = state->model->size.r;
   static const double none[3] = {0};
@@ -294,7 +295,7 @@ static int free_rotation(ep_free_step *f, const double *x) {
   for (int i = 0; i < 3; i++) h[i] /= f->def->dt;
   for (int n = 0; n < TURNS_MAX; n++) {
     double l[3], mean[3], turned[9], change = 0;
-    pull(f, x, f->turned);
+    pull(f, x, rotation ? rotation : f->turned);
     end_momentum(f, f->angular_ahead, f->torque, none, l);
     for (int i = 0; i < 3; i++) l[i] = 0.5 * (l[i] + state->angular[i]);
     ep_rotate_back(state->frame.R, l, mean);
@@ -303,7 +304,7 @@ static int free_rotation(ep_free_step *f, const double *x) {
     ep_rotation_exp(psi, turned);
     ep_multiply3(state->frame.R, turned, f->turned);
     for (int i = 0; i < 9; i++) change = fmax(change, fabs(f->turned[i] - last[i]));
-    if (f->def->pulls == 0 || change < 1e-13) return 1;
+    if (rotation || f->def->pulls == 0 || change < 1e-13) return 1;
   }
   return 0;
 }
@@ -383,7 +384,7 @@ void ep_free_freeze(ep_free_step *f, const double *x, const double *rotation) {
   ep_state *state = f->state;
   double s[6], free_turn[3];
   memcpy(state->free_at, x, (size_t)state->model->size.r * sizeof *x);
-  f->sound = free_rotation(f, x);
+  f->sound = free_rotation(f, x, rotation);
   if (!f->sound) return;
   memset(f->zeta, 0, sizeof f->zeta);
   if (rotation) {

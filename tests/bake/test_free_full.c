@@ -10,6 +10,7 @@
 //  - impacts far shorter than a step add no energy, wherever in the step they come, and change the
 //    momentum by dt times the force of every step, with every integrator;
 //  - at rest on a floor it stays at rest when another integrator goes on;
+//  - a push on an object that hits a floor gives its impulse where the object then stands;
 //  - something outside changes the momenta by its impulse, exactly; what does not act changes
 //    nothing, to the last bit; with a spring to the world errors fall as the integrator's order.
 #include "reduced/bake/full_step.h"
@@ -326,6 +327,62 @@ static void rest_is_rest_for_every_integrator(void **state) {
   drop_free_body(&f);
 }
 
+static void pushes_in_contact_give_their_impulse(void **state) {
+  (void)state;
+  const ep_frame plane = {{0, -0.3, 0}, {1, 0, 0, 0, 0, 1, 0, -1, 0}};
+  const ep_obstacle floor = {
+      .kind = EP_OBSTACLE_PLANE, .friction = 0.5, .start = plane, .end = plane};
+  const double velocity[3] = {0, -6, 0}, spin[3] = {3, 0, 9};
+  free_body f;
+  ep_contact_tree tree;
+  make_block(EP_STVK_VOLUME, SOFT, 15, 30, &tree, &f);
+  const int r = f.model->size.r;
+  const size_t last = (size_t)f.b.mesh.nv - 1;
+  double modes[90], *x = vector_of(f.b.n3), p[3], l[3], before[3];
+  ep_pull pull = {.force = {60, 40, -30}, .modes = modes};
+  for (size_t k = 0; k < 3; k++) {
+    pull.at[k] = f.b.mesh.x[3 * last + k] - f.model->rigid_origin[k];
+    for (int i = 0; i < r; i++)
+      modes[3 * i + (int)k] = f.model->u[(size_t)i * f.b.n3 + 3 * last + k];
+  }
+  ep_step_def def = ep_default_step();
+  def.tolerance = 1e-8;
+  def.damping_stiffness = 5e-3;
+  def.obstacle = &floor;
+  def.obstacles = 1;
+  def.pulls = 1;
+  def.gravity[1] = -9.81;
+  def.pull = &pull;
+  reset(&f, velocity, spin);
+  double worst = 0, largest = 0;
+  int touched = 0, iterations = 0;
+  for (int n = 0; n < 60; n++) {
+    ep_step_report report;
+    ep_state_momentum(f.state, p, before);
+    assert_int_equal(ep_step(f.state, &def, &report), EP_OK);
+    ep_state_momentum(f.state, p, l);
+    ep_state_positions(f.state, x);
+    touched += report.contact.touching > 0;
+    iterations += report.newton_iterations;
+    double arm[3];
+    for (size_t k = 0; k < 3; k++) arm[k] = x[3 * last + k] - ep_state_frame(f.state)->c[k];
+    for (int k = 0; k < 3; k++) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      const double torque =
+          report.contact.torque[k] + arm[i] * pull.force[j] - arm[j] * pull.force[i];
+      worst = fmax(worst, fabs(l[k] - before[k] - def.dt * torque));
+      largest = fmax(largest, fabs(l[k]));
+    }
+  }
+  print_message("push in contact: %.1e of the angular momentum, %d iterations\n", worst / largest,
+                iterations);
+  assert_true(touched > 5);
+  ASSERT_LESS(worst, 1e-6 * largest); // Newton's tolerance
+  free(x);
+  ep_contact_tree_free(&tree);
+  drop_free_body(&f);
+}
+
 // ---- something outside -------------------------------------------------------------------------
 
 // A spring of stiffness k from one vertex to a point of the world; acts within `reach`.
@@ -489,6 +546,7 @@ int main(void) {
       cmocka_unit_test(hard_landings_need_no_smaller_steps),
       cmocka_unit_test(impacts_add_no_energy),
       cmocka_unit_test(rest_is_rest_for_every_integrator),
+      cmocka_unit_test(pushes_in_contact_give_their_impulse),
       cmocka_unit_test(what_acts_gives_its_impulse),
       cmocka_unit_test(what_does_not_act_changes_nothing),
       cmocka_unit_test(errors_fall_with_the_integrators_order),
