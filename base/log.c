@@ -3,10 +3,11 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <time.h>
 #include <unistd.h>
 
-enum { BAR_WIDTH = 24 };
+enum { BAR_WIDTH = 24, BAR_LEAST = 4 };
 static const double redraw_seconds = 0.1, line_seconds = 5.0;
 
 double ep_seconds(void) {
@@ -59,6 +60,29 @@ static void describe(const ep_log *log, double now, char *text, size_t size) {
            log->done, log->total, rate, (double)(log->total - log->done) / rate);
 }
 
+static int terminal_width(void) {
+  struct winsize size;
+  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+}
+
+// One line: what runs over its end stays where it is when the line is drawn again. The bar
+// gives way first.
+static void draw(const ep_log *log, const char *text) {
+  const int room = terminal_width() - 1; // terminals go on to the next line behind the last column
+  const int free = room - (int)strlen(text) - 26; // name, brackets and blanks
+  const int width = free < BAR_WIDTH ? free : BAR_WIDTH;
+  const long filled = log->total > 0 ? width * log->done / log->total : 0;
+  char bar[BAR_WIDTH + 4] = "", line[256];
+  if (width >= BAR_LEAST) {
+    for (int i = 0; i < width; i++) bar[i + 1] = i < filled ? '#' : '.';
+    bar[0] = '[';
+    memcpy(bar + 1 + width, "] ", 3);
+  }
+  snprintf(line, sizeof line, "%-22s %s%s", log->stage, bar, text);
+  fprintf(stderr, "\r\033[K%.*s", room > 0 ? room : 1, line);
+  fflush(stderr);
+}
+
 static void show(ep_log *log, double now) {
   char text[128];
   describe(log, now, text, sizeof text);
@@ -66,12 +90,7 @@ static void show(ep_log *log, double now) {
     fprintf(stderr, "%s: %s\n", log->stage, text);
     return;
   }
-  const long filled = log->total > 0 ? BAR_WIDTH * log->done / log->total : 0;
-  char bar[BAR_WIDTH + 1];
-  for (int i = 0; i < BAR_WIDTH; i++) bar[i] = i < filled ? '#' : '.';
-  bar[BAR_WIDTH] = '\0';
-  fprintf(stderr, "\r\033[K%-22s [%s] %s", log->stage, bar, text);
-  fflush(stderr);
+  draw(log, text);
 }
 
 void ep_progress_begin(ep_log *log, const char *stage, long total) {

@@ -136,8 +136,11 @@ ep_status ep_figures_read(const char *path, const char *root, ep_figures *out, e
   const reader r = {path, root, err};
   json_error_t wrong;
   *out = (ep_figures){0};
-  if (!ep_path_exists(path)) return ep_fail(err, EP_ERR_IO, "%s: there is no such file", path);
-  out->list = json_load_file(path, 0, &wrong);
+  char *bytes;
+  size_t size;
+  EP_TRY(ep_file_read(path, &bytes, &size, err));
+  out->list = json_loadb(bytes, size, 0, &wrong);
+  free(bytes);
   if (!out->list)
     return ep_fail(err, EP_ERR_FORMAT, "%s:%d:%d: not JSON: %s", path, wrong.line, wrong.column,
                    wrong.text);

@@ -12,6 +12,7 @@ ep_status ep_session_open(const ep_cli *cli, ep_session *out, ep_error *err) {
 }
 
 void ep_session_close(ep_session *session) {
+  ep_progress_end(&session->log); // of a stage that failed: the message has a line of its own
   ep_plan_free(&session->plan);
   ep_shapes_free(&session->shapes);
   ep_scene_free(&session->scene);

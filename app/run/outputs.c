@@ -194,20 +194,40 @@ static ep_status make_gltf_solids(const ep_scene *scene, const ep_solids *solids
   return EP_OK;
 }
 
-// The moving frame as the pose of the node, with rest positions about the centre of mass: they take
-// the first (n x 3) of *motion, poses follow; malloc'd.
-static ep_status take_motion(ep_gltf_animation *a, const ep_model *model, const ep_record *record,
-                             const int *row, double **motion, ep_error *err) {
+// What rest positions count from: the centre of mass of a free object; of a held one the middle of
+// its mesh where it stands so far out that floats would not tell its vertices apart, else NULL.
+static const double *origin_of(const ep_mesh *mesh, const ep_model *model, const ep_record *record,
+                               double middle[3]) {
+  static const double far = 100; // extents: floats are good to 1e-5 of the extent there
+  double low[3], high[3], away = 0, extent = 0;
+  if (record->frame) return model->rigid_origin;
+  ep_mesh_bounds(mesh, low, high);
+  for (int i = 0; i < 3; i++) {
+    middle[i] = 0.5 * (low[i] + high[i]);
+    away = fmax(away, fabs(middle[i]));
+    extent = fmax(extent, high[i] - low[i]);
+  }
+  return away > far * extent ? middle : NULL;
+}
+
+// The moving frame, or where a held object stands, as the pose of the node, with rest positions
+// about its origin: they take the first (n x 3) of *motion, poses follow; malloc'd.
+static ep_status take_motion(ep_gltf_animation *a, const ep_mesh *mesh, const ep_model *model,
+                             const ep_record *record, const int *row, double **motion,
+                             ep_error *err) {
   const size_t n3 = 3 * (size_t)a->n, frames = (size_t)a->frames;
+  ep_frame still = {.R = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+  const double *origin = origin_of(mesh, model, record, still.c);
   *motion = NULL;
-  if (!record->frame) return EP_OK;
+  if (!origin) return EP_OK;
   *motion = malloc((n3 + 12 * frames) * sizeof **motion);
   if (!*motion) return no_memory(err);
   double *pose = *motion + n3;
-  for (size_t i = 0; i < n3; i++) (*motion)[i] = a->x[i] - model->rigid_origin[i % 3];
+  for (size_t i = 0; i < n3; i++) (*motion)[i] = a->x[i] - origin[i % 3];
   for (size_t f = 0; f < frames; f++) {
-    memcpy(pose + 12 * f, record->frame[row[f]].c, 3 * sizeof *pose);
-    memcpy(pose + 12 * f + 3, record->frame[row[f]].R, 9 * sizeof *pose);
+    const ep_frame *at = record->frame ? &record->frame[row[f]] : &still;
+    memcpy(pose + 12 * f, at->c, 3 * sizeof *pose);
+    memcpy(pose + 12 * f + 3, at->R, 9 * sizeof *pose);
   }
   a->x = *motion;
   a->pose = pose;
@@ -241,7 +261,7 @@ static ep_status write_glb(const char *folder, const ep_scene *scene, const ep_m
     a.triangle = triangle;
     status = make_gltf_solids(scene, solids, frames, time, &a, err);
   }
-  if (status == EP_OK) status = take_motion(&a, model, record, row, &motion, err);
+  if (status == EP_OK) status = take_motion(&a, mesh, model, record, row, &motion, err);
   if (status == EP_OK) status = ep_gltf_write(path, &a, err);
   if (a.solid) {
     free((void *)a.solid[0].pose);

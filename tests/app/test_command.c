@@ -4,6 +4,7 @@
 // again; mistakes end with the documented exit code and one message; stdout carries one JSON
 // object.
 #include <jansson.h>
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -254,6 +255,34 @@ static void names_of_files_may_be_any_bytes(void **state) {
   json_decref(report());
 }
 
+// In single precision a beam at 1e7 m is a point: its node stands there, its vertices about it.
+static void animations_keep_their_shape_far_from_the_origin(void **state) {
+  (void)state;
+  assert_int_equal(system("awk '/^\\*/ {s = $1} s == \"*VERTICES\" && NF == 4 && $2 != 3 {$2 = "
+                          "sprintf(\"%.9f\", $2 + 1e7)} {print}' beam.veg > far.veg"),
+                   0);
+  assert_int_equal(program("",
+                           "run beam.yaml --cache cache-far --out far --set object.mesh=far.veg "
+                           "--set families=[] --set simulation.steps=2 --set fixed.0.box.high="
+                           "[10000000.01,1,1] --set loads=[] --set output.formats=[glb]"),
+                   0);
+  char *bytes;
+  size_t size;
+  assert_int_equal(ep_file_read("far/animation.glb", &bytes, &size, NULL), EP_OK);
+  json_t *root = json_loadb(bytes + 20, size - 20, JSON_DISABLE_EOF_CHECK, NULL);
+  const json_t *primitive = json_array_get(
+      json_object_get(json_array_get(json_object_get(root, "meshes"), 0), "primitives"), 0);
+  const json_int_t at =
+      json_integer_value(json_object_get(json_object_get(primitive, "attributes"), "POSITION"));
+  const json_t *position = json_array_get(json_object_get(root, "accessors"), (size_t)at);
+  const json_t *low = json_object_get(position, "min"), *high = json_object_get(position, "max");
+  const double width =
+      json_number_value(json_array_get(high, 0)) - json_number_value(json_array_get(low, 0));
+  if (fabs(width - 1) > 1e-3) fail_msg("%g m instead of 1 m", width);
+  json_decref(root);
+  free(bytes);
+}
+
 // RLIMIT_FSIZE stands for a full disk: the run fails with a message, and leaves no half result.
 // (A run from a warm cache: MPI, which the baker starts, does not bear the limit.)
 static void a_full_disk_is_said(void **state) {
@@ -324,6 +353,7 @@ int main(void) {
       cmocka_unit_test(inputs_are_not_written_over),
       cmocka_unit_test(formats_of_an_earlier_run_are_taken_away),
       cmocka_unit_test(names_of_files_may_be_any_bytes),
+      cmocka_unit_test(animations_keep_their_shape_far_from_the_origin),
       cmocka_unit_test(a_full_disk_is_said),
       cmocka_unit_test(eigenvalues_and_plans_are_printed),
   };

@@ -1,5 +1,6 @@
 // base/: the first error wins; outputs are whole or absent; random numbers repeat and are uniform;
-// hashes tell contents apart.
+// hashes tell contents apart; progress on a terminal stays on its line.
+#define _GNU_SOURCE // posix_openpt
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -8,9 +9,12 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -19,6 +23,7 @@
 #include "base/escape.h"
 #include "base/files.h"
 #include "base/forest.h"
+#include "base/log.h"
 #include "base/random.h"
 
 static void first_error_is_kept(void **state) {
@@ -239,6 +244,56 @@ static void devices_and_inputs_are_no_results(void **state) {
   assert_int_equal(ep_output_spares("new", "./abc", NULL), EP_OK);
 }
 
+// What a terminal of `columns` is sent while a stage draws its progress; in a process of its own,
+// whose stderr is the terminal.
+static void drawn_on_terminal(unsigned short columns, char *out, size_t size) {
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
+  const struct winsize window = {.ws_row = 24, .ws_col = columns};
+  assert_true(terminal >= 0 && grantpt(terminal) == 0 && unlockpt(terminal) == 0);
+  const int other = open(ptsname(terminal), O_RDWR | O_NOCTTY);
+  assert_true(other >= 0 && ioctl(other, TIOCSWINSZ, &window) == 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    dup2(other, STDERR_FILENO);
+    ep_log log = ep_log_default(false);
+    ep_progress_begin(&log, "training forces", 123456);
+    for (int i = 0; i < 3; i++) {
+      log.shown = 0; // draw at once
+      ep_progress(&log, 61728 + i);
+    }
+    ep_progress_end(&log);
+    _exit(log.terminal ? 0 : 1);
+  }
+  close(other);
+  size_t used = 0;
+  for (ssize_t got; used + 1 < size && (got = read(terminal, out + used, size - used - 1)) > 0;)
+    used += (size_t)got;
+  out[used] = '\0';
+  close(terminal);
+  int status;
+  assert_int_equal(waitpid(child, &status, 0), child);
+  assert_int_equal(status, 0);
+}
+
+// A line as long as the terminal is wide goes on below and is not drawn over any more.
+static void progress_stays_on_its_line(void **state) {
+  (void)state;
+  static const unsigned short columns[] = {200, 80, 60, 40};
+  for (size_t i = 0; i < sizeof columns / sizeof *columns; i++) {
+    char text[4096];
+    int bars = 0, times = 0;
+    drawn_on_terminal(columns[i], text, sizeof text);
+    for (char *line = strtok(text, "\r\n"); line; line = strtok(NULL, "\r\n")) {
+      const char *shown = strncmp(line, "\033[K", 3) == 0 ? line + 3 : line;
+      if (strlen(shown) >= columns[i]) fail_msg("%d columns: '%s'", columns[i], shown);
+      bars += strstr(shown, "#.") != NULL;
+      times += strstr(shown, "s left") != NULL;
+    }
+    assert_int_equal(bars, columns[i] >= 80 ? 3 : 0);
+    if (columns[i] >= 80) assert_int_equal(times, 3);
+  }
+}
+
 static void hashes_tell_contents_apart(void **state) {
   (void)state;
   const ep_digest a = ep_hash_bytes("abc", 3), b = ep_hash_bytes("abd", 3);
@@ -264,6 +319,7 @@ int main(void) {
       cmocka_unit_test(texts_are_fit_for_attributes),
       cmocka_unit_test(any_bytes_become_utf8),
       cmocka_unit_test(devices_and_inputs_are_no_results),
+      cmocka_unit_test(progress_stays_on_its_line),
       cmocka_unit_test(hashes_tell_contents_apart),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
