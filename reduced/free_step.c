@@ -8,6 +8,8 @@
 enum { TURNS_MAX = 200 };
 // Half a turn in one step is no motion a step could resolve.
 static const double largest_turn = 3;
+// How far in a step [rad] the spin of an iterate's momenta may go from that of its rotation.
+static const double spin_reach = 0.5;
 
 // ---- C, and turning by it ------------------------------------------------------------------
 
@@ -180,6 +182,16 @@ static void damp_from(ep_free_step *f) {
                         state->free_still, state->free_scratch, &rate, &inertia);
 }
 
+// Newmark's rate goes on from that of the step before, and nothing but damping takes errors out of
+// it: there it has to act on the very rate the step ends with, P - C(omega) q.
+static void damp_end_from(ep_free_step *f, const double *x) {
+  ep_state *state = f->state;
+  const int r = state->model->size.r;
+  times(r, state->free_c, x, state->free_still);
+  for (int a = 0; a < r; a++)
+    state->free_still[a] = state->base[a] + state->free_still[a] / f->rate;
+}
+
 void ep_free_begin(ep_free_step *f, ep_state *state, const ep_step_def *def, double dt_before,
                    double *a) {
   const size_t r = (size_t)state->model->size.r;
@@ -203,7 +215,7 @@ void ep_free_begin(ep_free_step *f, ep_state *state, const ep_step_def *def, dou
                             .dt_before = f->dt_before};
   ep_integrator_predict(def->integrator, r, def->dt, &motion, state->free_base, state->free_ahead,
                         &f->rate, &f->inertia);
-  damp_from(f);
+  if (def->integrator != EP_NEWMARK) damp_from(f);
   f->turn_inertia = f->inertia;
   if (def->integrator == EP_BDF2 && f->dt_before > 0) f->turn_inertia = 2 * f->rate / def->dt;
   for (int i = 0; i < 3; i++) {
@@ -361,13 +373,20 @@ static int spin_at_end(ep_free_step *f, const double *x) {
   return spin_of_momenta(r, f->j, state->free_h, l_body, state->free_scratch, f->omega);
 }
 
-// The same of the rotation: of free flight (free_turn: twice the mean less that at the start), and
-// what the world turned on its way. An iterate deep in an obstacle feels a torque that no step ends
-// with; taken for spin, its centrifugal force would drive the iterates apart.
-static void spin_of_rotation(ep_free_step *f, const double free_turn[3]) {
-  const double outside = f->turn_inertia / f->rate;
+// The same with something outside. An iterate deep in an obstacle feels a torque that no step ends
+// with; taken for spin, its centrifugal force would drive the iterates apart. So it is that of the
+// rotation at hand: of free flight (free_turn: twice the mean less that at the start), and what was
+// turned from there. Implicit Euler goes by that; where half of a torque turns the step (Newmark,
+// BDF2) errors of it would double, and it is that of the momenta as far as it is within reach.
+static void spin_in_contact(ep_free_step *f, const double *x, const double free_turn[3]) {
+  const double dt = f->def->dt, outside = f->turn_inertia / f->rate;
+  double turned[3], away[3];
   for (int i = 0; i < 3; i++)
-    f->omega[i] = 2 * free_turn[i] / f->def->dt - f->omega_start[i] + outside * f->zeta[i];
+    turned[i] = 2 * free_turn[i] / dt - f->omega_start[i] + outside * f->zeta[i];
+  const int known = f->def->integrator != EP_IMPLICIT_EULER && spin_at_end(f, x);
+  for (int i = 0; i < 3; i++) away[i] = known ? f->omega[i] - turned[i] : 0;
+  const double far = sqrt(ep_dot(3, away, away)) * dt, share = fmin(1, spin_reach / far);
+  for (int i = 0; i < 3; i++) f->omega[i] = turned[i] + (far > 0 ? share * away[i] : 0);
 }
 
 // base and ahead in the axes of the step's end.
@@ -397,9 +416,10 @@ void ep_free_freeze(ep_free_step *f, const double *x, const double *rotation) {
   ep_rigid_tensor(s, f->j);
   f->sound = ep_inverse3(f->j, f->j_inverse) && (rotation || spin_at_end(f, x));
   if (!f->sound) return;
-  if (rotation) spin_of_rotation(f, free_turn);
+  if (rotation) spin_in_contact(f, x, free_turn);
   inertial_forces(f, x, f->omega, f->turned, state->free_ds, state->free_force);
   fill_softening(state, f->omega);
+  if (f->def->integrator == EP_NEWMARK) damp_end_from(f, x);
 }
 
 int ep_free_settle(ep_free_step *f, const double *x) {

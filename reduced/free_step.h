@@ -69,7 +69,7 @@ double ep_free_energy(const ep_free_step *f, const double *x, int joint, double 
 void ep_free_center(const ep_free_step *f, double c[3]);
 
 // With contact: omega at the end of the step by its momenta, x and contact found; while they were
-// looked for it went by the rotation. 0: there is none, and the state is as it was.
+// looked for the rotation had a say. 0: there is none, and the state is as it was.
 int ep_free_settle(ep_free_step *f, const double *x);
 
 // Into the state: momenta, frame, acceleration of the rigid motion, velocity (q' from p at x).

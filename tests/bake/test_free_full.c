@@ -203,7 +203,7 @@ static void a_bounce_is_that_of_the_full_space(void **state) {
 }
 
 // Thrown at a floor with the speed of a fall from 3 and 13 m: free flight of a step of 1/60 s ends
-// up to 0.27 m deep, more than half of the block.
+// up to 0.27 m deep, more than half of the block. Newmark and BDF2 want a quarter of it.
 static void hard_landings_need_no_smaller_steps(void **state) {
   (void)state;
   static const ep_material law[] = {EP_STVK_VOLUME, EP_STABLE_NEOHOOKEAN, EP_COROTATIONAL};
@@ -220,8 +220,10 @@ static void hard_landings_need_no_smaller_steps(void **state) {
     free_body f;
     ep_contact_tree tree;
     make_block(law[i], SOFT, 15, 30, &tree, &f);
-    for (int j = 0; j < 2; j++) {
-      const double velocity[3] = {1, -speed[j], 0}, spin[3] = {2, 3, 6};
+    for (int j = 0; j < 2 * EP_INTEGRATORS; j++) {
+      const double velocity[3] = {1, -speed[j % 2], 0}, spin[3] = {2, 3, 6};
+      def.integrator = (ep_integrator)(j / 2);
+      def.dt = def.integrator == EP_IMPLICIT_EULER ? 1. / 60 : 1. / 240;
       ep_step_report report;
       int touched = 0;
       reset(&f, velocity, spin);
@@ -230,7 +232,7 @@ static void hard_landings_need_no_smaller_steps(void **state) {
         touched += report.contact.touching > 0;
       }
       assert_true(touched > 0);
-      ASSERT_LESS(report.contact.deepest, 0.02); // at rest or nearly so, on the floor
+      ASSERT_LESS(report.contact.deepest, 0.02); // on the floor or above
     }
     ep_contact_tree_free(&tree);
     drop_free_body(&f);
