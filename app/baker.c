@@ -74,6 +74,7 @@ static ep_status on_scene(const ep_cli *cli, ep_error *err) {
 int main(int argc, char **argv) {
   ep_cli cli;
   ep_error err = {0};
+  ep_cli_guard_streams();
   ep_blas_core_check(argv);
   ep_cli_parse(argc, argv, &cli);
   ep_status status;
@@ -94,5 +95,6 @@ int main(int argc, char **argv) {
   default:
     status = ep_fail(&err, EP_ERR_ARGUMENT, "the baker bakes; use eigenpose for this command");
   }
+  if (status == EP_OK) status = ep_cli_flush(&err);
   return status == EP_OK ? 0 : ep_cli_fail(&cli, &err);
 }

@@ -1,6 +1,8 @@
 #include "app/cli.h"
 
 #include <argp.h>
+#include <errno.h>
+#include <fcntl.h>
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -288,6 +290,18 @@ void ep_cli_parse(int argc, char **argv, ep_cli *out) {
   argp_err_exit_status = EP_ERR_ARGUMENT;
   argp_parse(&argp, argc - 1, argv + 1, 0, NULL, out);
   argv[1] = kept;
+}
+
+void ep_cli_guard_streams(void) {
+  for (int stream = 0; stream < 3; stream++)
+    if (fcntl(stream, F_GETFD) < 0) // the lowest free number is this one
+      (void)!open("/dev/null", stream == 0 ? O_WRONLY : O_RDONLY);
+}
+
+ep_status ep_cli_flush(ep_error *err) {
+  if (fflush(stdout) == 0 && !ferror(stdout)) return EP_OK;
+  return ep_fail(err, EP_ERR_IO, "cannot write all of the report to stdout: %s",
+                 strerror(errno ? errno : EIO));
 }
 
 int ep_cli_fail(const ep_cli *cli, const ep_error *err) {

@@ -39,6 +39,12 @@ typedef struct ep_cli {
   const char *set[EP_SETS_MAX];
 } ep_cli;
 
+// First of all: where stdin, stdout or stderr is closed, the next file opened would take its number
+// and get what is printed. Such a stream fails instead.
+void ep_cli_guard_streams(void);
+// Last of all: whether what was printed has arrived. EP_ERR_IO.
+ep_status ep_cli_flush(ep_error *err);
+
 // Parse; --help, --version and mistakes end the process (argp), mistakes with status
 // EP_ERR_ARGUMENT.
 void ep_cli_parse(int argc, char **argv, ep_cli *out);

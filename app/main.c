@@ -23,8 +23,10 @@ static ep_status perform(const ep_cli *cli, char **argv, bool *found, ep_error *
 int main(int argc, char **argv) {
   ep_cli cli;
   ep_error err = {0};
+  ep_cli_guard_streams();
   ep_cli_parse(argc, argv, &cli);
   bool found = false; // check: errors in what was checked
-  if (perform(&cli, argv, &found, &err) != EP_OK) return ep_cli_fail(&cli, &err);
+  if (perform(&cli, argv, &found, &err) != EP_OK || ep_cli_flush(&err) != EP_OK)
+    return ep_cli_fail(&cli, &err);
   return found ? EP_EXIT_FOUND : 0;
 }

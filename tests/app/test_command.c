@@ -162,8 +162,35 @@ static void mistakes_have_documented_exit_codes(void **state) {
   expect_failure(9, "free objects", "compare free.yaml");
   expect_failure(2, "cache-file", "bake beam.yaml --cache cache-file");
   expect_failure(2, "is a file", "run beam.yaml --cache cache-c --out beam.yaml/results");
-  assert_int_equal(WEXITSTATUS(system(EP_COMMAND " plan beam.yaml --json >/dev/full 2>err.txt")),
-                   2);
+}
+
+// A report that is cut short is none; and what is printed never lands in a file of results.
+static void reports_arrive_or_it_is_said(void **state) {
+  (void)state;
+  static const char *const commands[] = {"plan beam.yaml", "bake beam.yaml", "eigen beam.veg",
+                                         "check beam.veg",
+                                         "run beam.yaml --set simulation.steps=5"};
+  static const char *const ways[] = {">/dev/full", "--json >/dev/full", ">&-", "--json >&-"};
+  setenv("EIGENPOSE_CACHE", "cache-a", 1);
+  for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)
+    for (size_t j = 0; j < sizeof ways / sizeof *ways; j++) {
+      char line[512];
+      snprintf(line, sizeof line, EP_COMMAND " %s %s 2>err.txt", commands[i], ways[j]);
+      const int status = system(line);
+      char *err = text_of("err.txt");
+      if (WEXITSTATUS(status) != 2 || !strstr(err, "to stdout"))
+        fail_msg("%s: exit code %d, '%s'", line, WEXITSTATUS(status), err);
+      free(err);
+    }
+  unsetenv("EIGENPOSE_CACHE");
+  int count;
+  assert_int_equal(
+      program("", "run beam.yaml --cache cache-a --out open --set output.formats=[vtu]"), 0);
+  assert_int_equal(system(EP_COMMAND " run beam.yaml --cache cache-closed --out closed --set "
+                                     "output.formats=[vtu] <&- 2>&- >/dev/null"),
+                   0);
+  assert_true(same_files("open", "closed", "trajectory.csv", &count) && count == 1);
+  assert_true(same_files("open/frames", "closed/frames", ".vtu", &count) && count == 7);
 }
 
 static void failures_are_json_too(void **state) {
@@ -349,6 +376,7 @@ int main(void) {
       cmocka_unit_test(two_bakes_are_byte_identical),
       cmocka_unit_test(damaged_results_are_baked_again),
       cmocka_unit_test(mistakes_have_documented_exit_codes),
+      cmocka_unit_test(reports_arrive_or_it_is_said),
       cmocka_unit_test(failures_are_json_too),
       cmocka_unit_test(inputs_are_not_written_over),
       cmocka_unit_test(formats_of_an_earlier_run_are_taken_away),
