@@ -233,7 +233,7 @@ static void choose_start(ep_step_run *s) {
   double still = ep_step_energy(s, state->q, NULL, NULL, 0);
   double flight = ep_step_energy(s, state->aside, NULL, NULL, 0);
   memcpy(state->x, flight < still ? state->aside : state->q, bytes);
-  if (s->free) ep_free_freeze(&s->motion, state->x, NULL);
+  if (s->free && flight < still) ep_free_freeze(&s->motion, state->x, NULL); // it is, at q
 }
 
 // Minimise; again while friction asks for it.
