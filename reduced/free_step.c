@@ -10,6 +10,9 @@ enum { TURNS_MAX = 200 };
 static const double largest_turn = 3;
 // How far in a step [rad] the spin of an iterate's momenta may go from that of its rotation.
 static const double spin_reach = 0.5;
+// Furthest a step of Newton goes in looking for the turn: from nothing along the way there, or at
+// more than 2 rad about an axis that is not a principal one it would jump past half a turn.
+static const double largest_change = 0.25;
 
 // ---- C, and turning by it ------------------------------------------------------------------
 
@@ -277,8 +280,10 @@ static int mean_rotation(const double j[9], const double l[3], const double h[3]
     for (int i = 0; i < 3; i++) residual[i] = mean[i] - h[i] - residual[i] / dt;
     for (int i = 0; i < 9; i++) slope[i] = j[i] / dt - slope[i];
     if (!solve3(slope, residual, change)) return 0;
-    for (int i = 0; i < 3; i++) psi[i] += change[i];
-    const double size = sqrt(ep_dot(3, change, change)), angle = sqrt(ep_dot(3, psi, psi));
+    const double size = sqrt(ep_dot(3, change, change));
+    const double share = size > largest_change ? largest_change / size : 1;
+    for (int i = 0; i < 3; i++) psi[i] += share * change[i];
+    const double angle = sqrt(ep_dot(3, psi, psi));
     // nothing left, or round-off goes round in circles
     if (size <= 4e-16 * angle || (size <= 1e-13 * angle && size >= last)) return 1;
     last = size;
