@@ -239,8 +239,9 @@ static ep_status check_pairs(const ep_csr *k, const ep_csr *m, const search *s, 
     const double residual = relative_residual(k, s, lambda[j], x + (size_t)j * n, mx, kx);
     if (!(residual <= residual_limit))
       return ep_fail(err, EP_ERR_NUMERIC,
-                     "eigenpair %d (eigenvalue %g) has a relative residual of %.2g, above %.0g", j,
-                     lambda[j], residual, residual_limit);
+                     "eigenpair %d (eigenvalue %g) has a relative residual of %.2g, above %.0g: "
+                     "a mesh with tets of next to no volume does that; see 'eigenpose check'",
+                     j, lambda[j], residual, residual_limit);
     for (int i = 0; i <= j; i++) {
       const double off = fabs(dot(k->n, mx, x + (size_t)i * n) - (i == j));
       if (!(off <= orthonormality_limit))

@@ -285,9 +285,9 @@ static ep_status report_tets(const ep_bake *bake, int index, ep_error *err) {
   }
   if (q->repair_share > share_doubtful)
     ep_warn(bake->log,
-            "example %s: %.0f inverted tets repaired, which moved the object by %.2g of what the "
-            "pose does",
-            name, q->inverted_before, q->repair_share);
+            "example %s: %.0f inverted and %.0f crushed tets repaired, which moved the object by "
+            "%.2g of what the pose does",
+            name, q->inverted_before, q->crushed_before - q->inverted_before, q->repair_share);
   if (q->crushed_tets > 0)
     ep_warn(bake->log,
             "example %s: %.0f tets stay crushed (smallest volume %.2g of rest); they cannot serve "

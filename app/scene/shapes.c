@@ -9,6 +9,7 @@
 #include "app/scene/select.h"
 #include "mesh/io.h"
 #include "mesh/quality.h"
+#include "mesh/topology.h"
 
 // They are no error: everything is computed with them, but stiffly and with less accuracy.
 static void warn_of_slivers(const ep_mesh *mesh, ep_log *log) {
@@ -22,6 +23,19 @@ static void warn_of_slivers(const ep_mesh *mesh, ep_log *log) {
       "%s: %d tets are slivers (dihedral angles within %g degree of 0 or 180); worst: %s; let the "
       "mesher optimise its quality",
       mesh->name, quality.slivers, EP_SLIVER_DEGREES, worst);
+}
+
+// Nor are these: what lies in each other moves together, but its mass and stiffness count twice.
+static ep_status warn_of_overlaps(const ep_mesh *mesh, ep_log *log, ep_error *err) {
+  ep_mesh_topology t;
+  if (!log) return EP_OK;
+  EP_TRY(ep_mesh_examine(mesh, &t, err));
+  if (t.overlapping_faces)
+    ep_warn(log,
+            "%s: %d faces have two tets on the same side (first: tets %d and %d): the tets lie in "
+            "each other; mesh anew, see 'eigenpose check'",
+            mesh->name, t.overlapping_faces, t.overlap_first + 1, t.overlap_second + 1);
+  return EP_OK;
 }
 
 static ep_status read_shape(const char *path, const char *family, bool whole, ep_log *log,
@@ -38,6 +52,7 @@ static ep_status read_shape(const char *path, const char *family, bool whole, ep
     snprintf(shape->name, sizeof shape->name, "object");
   EP_TRY(ep_mesh_require_sound(&shape->mesh, &findings, whole, err));
   warn_of_slivers(&shape->mesh, log);
+  if (whole) EP_TRY(warn_of_overlaps(&shape->mesh, log, err));
   const ep_mesh *mesh = &shape->mesh;
   ep_hash_text text = {0};
   ep_hash_add_bytes(&text, "x", mesh->x, 3 * (size_t)mesh->nv * sizeof *mesh->x);

@@ -256,6 +256,14 @@ static void usage(void **state) {
   has_text("out.txt", "islands.veg: islands:");
   assert_int_equal(program("", "check absent.yaml islands.veg"), 2);
   assert_int_equal(program("", "check sound.veg absent.veg"), 2);
+  // what a bake takes all the same, it warns of
+  for (size_t i = 0; i < sizeof meshes / sizeof *meshes; i++)
+    if (strcmp(meshes[i].file, "overlapping.veg") == 0) write_veg(&meshes[i]);
+  write_text("double.yaml", "schema: 1\nobject: {mesh: overlapping.veg, material: {density: 1000, "
+                            "young: 1e5, poisson: 0.4}}\nreduction: {modes: 1, linear_modes: 1}\n");
+  assert_int_equal(program("", "plan double.yaml --quiet"), 0);
+  has_text("err.txt", "warning: ./overlapping.veg: ");
+  has_text("err.txt", "first: tets 1 and 2");
   assert_int_equal(program("", "check"), 1);
   assert_int_equal(program("", "check sound.veg islands.veg --repair x.veg"), 1);
   assert_int_equal(program("", "check sound.veg --repair x.msh"), 1);
