@@ -101,6 +101,11 @@ static void list_points(ep_comparison *c, const ep_sweep *s) {
 
 static ep_status make_points(sweep *w, ep_error *err) {
   list_points(&w->result, &w->session->scene.sweep); // counts
+  if (!w->result.count)
+    return ep_fail(err, EP_ERR_SCENE,
+                   "%s: compare.methods and compare.materials leave nothing to measure: cubic "
+                   "polynomials are exact for stvk and stvk-volume only; add another method",
+                   w->session->scene.path);
   w->result.point = calloc((size_t)w->result.count, sizeof *w->result.point);
   if (!w->result.point) return ep_fail(err, EP_ERR_MEMORY, "no memory for a comparison");
   list_points(&w->result, &w->session->scene.sweep);

@@ -321,6 +321,7 @@ static void mistakes_are_named(void **state) {
       {"compare.modes=[4.5]", "whole number"},
       {"compare.methods=[magic]", "methods"},
       {"compare.reference=cubature", "full"},
+      {"compare={materials: [corotational], methods: [cubic]}", "nothing to measure"},
   };
   write_box("beam.veg", 6, 2, 2, 1.2, 0, 2e4);
   write_box("beam-bent.veg", 6, 2, 2, 1.2, 0.2, 0);
