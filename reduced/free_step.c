@@ -381,14 +381,15 @@ static int spin_at_end(ep_free_step *f, const double *x) {
 // The same with something outside. An iterate deep in an obstacle feels a torque that no step ends
 // with; taken for spin, its centrifugal force would drive the iterates apart. So it is that of the
 // rotation at hand: of free flight (free_turn: twice the mean less that at the start), and what was
-// turned from there. Implicit Euler goes by that; where half of a torque turns the step (Newmark,
-// BDF2) errors of it would double, and it is that of the momenta as far as it is within reach.
+// turned from there. An outer potential is smooth, and acts in every step: where half of its torque
+// turns the step (Newmark, BDF2) errors of the rotation would double, and it is that of the momenta
+// as far as that is within reach.
 static void spin_in_contact(ep_free_step *f, const double *x, const double free_turn[3]) {
   const double dt = f->def->dt, outside = f->turn_inertia / f->rate;
   double turned[3], away[3];
   for (int i = 0; i < 3; i++)
     turned[i] = 2 * free_turn[i] / dt - f->omega_start[i] + outside * f->zeta[i];
-  const int known = f->def->integrator != EP_IMPLICIT_EULER && spin_at_end(f, x);
+  const int known = f->def->outer && f->def->integrator != EP_IMPLICIT_EULER && spin_at_end(f, x);
   for (int i = 0; i < 3; i++) away[i] = known ? f->omega[i] - turned[i] : 0;
   const double far = sqrt(ep_dot(3, away, away)) * dt, share = fmin(1, spin_reach / far);
   for (int i = 0; i < 3; i++) f->omega[i] = turned[i] + (far > 0 ? share * away[i] : 0);

@@ -74,7 +74,8 @@ static bool moves(const random_scene *s, const placement *at, const char *folder
     *out = (motion){.nv = b.file.model.size.n, .extent = b.file.model.rest_scale / at->unit};
     out->x = malloc((size_t)(s->steps + 1) * row * sizeof *out->x);
     assert_non_null(out->x);
-    ep_stepper_def(b.stepper)->target_tolerance = 1e-11;
+    // round-off of a bulk modulus may be more than 1e-11 of a target next to rest (seed 400252)
+    ep_stepper_def(b.stepper)->target_tolerance = s->poisson > 0.49 ? 1e-7 : 1e-11;
     ep_stepper_def(b.stepper)->tolerance = 1e-11;
     ep_status status = EP_OK;
     ep_frame before = *ep_state_frame(ep_stepper_state(b.stepper));
