@@ -122,8 +122,8 @@ static ep_status leave_files(const char *out, const ep_mesh *mesh, const ep_lb *
 
 static ep_status print(const ep_cli *cli, const ep_mesh *mesh, const ep_lb *lb, ep_error *err) {
   if (cli->json)
-    return ep_report_print(json_pack("{s:o, s:i, s:i, s:f, s:o}", "mesh", ep_json_text(mesh->name), "vertices",
-                                     mesh->nv, "tets", mesh->nt, "volume", lb->volume,
+    return ep_report_print(json_pack("{s:o, s:i, s:i, s:f, s:o}", "mesh", ep_json_text(mesh->name),
+                                     "vertices", mesh->nv, "tets", mesh->nt, "volume", lb->volume,
                                      "eigenvalues", ep_json_numbers(lb->m, lb->lambda)),
                            err);
   printf("%s: %d vertices, %d tets, volume %.8g\n", mesh->name, mesh->nv, mesh->nt, lb->volume);

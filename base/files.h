@@ -34,8 +34,8 @@ ep_status ep_file_write(const char *path, const void *bytes, size_t size, ep_err
 ep_status ep_make_folders(const char *path, ep_error *err);
 // The same for a folder of results, which must take files: known before long work, not behind it.
 ep_status ep_output_folder(const char *path, ep_error *err);
-// For one file of results: its folder must be there and take files, and the path be no folder and no
-// device; made is nothing.
+// For one file of results: its folder must be there and take files, and the path be no folder and
+// no device; made is nothing.
 ep_status ep_output_place(const char *path, ep_error *err);
 // Refused where both paths lead to one file: a result never replaces what it was made from.
 ep_status ep_output_spares(const char *path, const char *input, ep_error *err);

@@ -167,7 +167,7 @@ static void start_acceleration(ep_free_step *f, const double omega[3], double *a
 // Origin of the damping by stiffness, which acts on q' = rate (x - origin) itself. The same rate as
 // P - C(omega) q would follow the rotation, and the rotation the iterate: times a bulk modulus that
 // changes forces by more than Newton gains (nearly incompressible bodies took 25 to 80 iterations
-// a step in free flight, and may have found no step at all).
+// a step in free flight, or found none).
 static void damp_from(ep_free_step *f) {
   ep_state *state = f->state;
   double rate, inertia;

@@ -124,8 +124,8 @@ int ep_stress_inverted(ep_stress_bench *bench);
 ep_status ep_stress_run(const ep_session *base, const ep_stress_case *c, ep_stress_result *out,
                         ep_error *err);
 // Do the step of a stored state (failures/*.json) again and tell about it on stdout, as JSON or as
-// text. Errors: EP_ERR_IO, EP_ERR_FORMAT (cut, of an older version, of another model), EP_ERR_NUMERIC
-// (the step fails again).
+// text. Errors: EP_ERR_IO, EP_ERR_FORMAT (cut, of an older version, of another model),
+// EP_ERR_NUMERIC (the step fails again).
 ep_status ep_stress_replay(const ep_session *base, const char *path, bool json, ep_error *err);
 
 enum { EP_STRESS_FORMAT = 2 }; // "format" of these files

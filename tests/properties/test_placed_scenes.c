@@ -120,11 +120,12 @@ static double bound_of(const random_scene *s, const motion *home) {
 }
 
 static bool agree(const motion *home, const motion *there, double bound, char *why) {
-  if (home->nv != there->nv || (home->rows != there->rows && home->resolved == home->rows))
+  const int whole = home->resolved == home->rows;
+  if (home->nv != there->nv || (whole && home->rows != there->rows) || there->rows < home->resolved)
     return breaks(why, "%d steps at home, %d there", home->rows - 1, there->rows - 1);
   if (!(fabs(home->extent - there->extent) < 1e-12 * home->extent))
     return breaks(why, "extent %.17g at home, %.17g there", home->extent, there->extent);
-  for (int row = 0; row < home->resolved && row < there->rows; row++)
+  for (int row = 0; row < home->resolved; row++)
     for (int v = 0; v < home->nv; v++) {
       const double *a = home->x + 3 * ((size_t)row * (size_t)home->nv + (size_t)v);
       const double *b = there->x + (a - home->x);
